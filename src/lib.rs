@@ -2,6 +2,8 @@
 #![forbid(unsafe_code)]
 
 pub mod error;
+pub mod geometry;
+pub mod kernel;
 pub mod monitor;
 pub mod scene;
 

@@ -1,0 +1,149 @@
+//! Convex polygons in a plane, and their cutting by linear functions.
+//!
+//! Polygons are slices of corners, counter-clockwise. Many pieces live in one [`Pieces`] arena, so
+//! that cutting allocates nothing once the arena has grown.
+
+use glam::DVec2;
+
+/// A linear function on a plane with a bound on its rounding error: f(x) = g . x + c.
+///
+/// Values of size at most `uncertainty` count as zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Linear {
+    /// Gradient.
+    pub g: DVec2,
+    /// Value at the origin.
+    pub c: f64,
+    /// Values no larger than this in size count as zero.
+    pub uncertainty: f64,
+}
+
+impl Linear {
+    /// Value at `x`, with uncertain values replaced by zero.
+    pub fn at(&self, x: DVec2) -> f64 {
+        let value = self.g.dot(x) + self.c;
+        if value.abs() <= self.uncertainty { 0.0 } else { value }
+    }
+
+    /// Whether no point of `polygon` has a (certainly) positive value.
+    pub fn nowhere_positive(&self, polygon: &[DVec2]) -> bool {
+        polygon.iter().all(|&x| self.at(x) <= 0.0)
+    }
+
+    /// Whether no point of `polygon` has a (certainly) negative value.
+    pub fn nowhere_negative(&self, polygon: &[DVec2]) -> bool {
+        polygon.iter().all(|&x| self.at(x) >= 0.0)
+    }
+}
+
+/// Twice the signed area, positive for counter-clockwise polygons.
+pub fn twice_area(polygon: &[DVec2]) -> f64 {
+    let Some((&first, rest)) = polygon.split_first() else { return 0.0 };
+    rest.windows(2).map(|w| (w[0] - first).perp_dot(w[1] - first)).sum()
+}
+
+/// A list of convex polygons, stored end to end.
+#[derive(Clone, Debug, Default)]
+pub struct Pieces {
+    corners: Vec<DVec2>,
+    ends: Vec<usize>,
+}
+
+impl Pieces {
+    /// Removes all pieces; keeps the memory.
+    pub fn clear(&mut self) {
+        self.corners.clear();
+        self.ends.clear();
+    }
+
+    /// How many pieces there are.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The corners of piece `i`.
+    pub fn get(&self, i: usize) -> &[DVec2] {
+        let begin = if i == 0 { 0 } else { self.ends[i - 1] };
+        &self.corners[begin..self.ends[i]]
+    }
+
+    /// All pieces in order.
+    pub fn iter(&self) -> impl Iterator<Item = &[DVec2]> {
+        (0..self.len()).map(|i| self.get(i))
+    }
+
+    /// Adds a piece.
+    pub fn push(&mut self, polygon: &[DVec2]) {
+        self.corners.extend_from_slice(polygon);
+        self.ends.push(self.corners.len());
+    }
+
+    /// Adds the part of convex `polygon` where `f >= 0`; returns whether there was any.
+    ///
+    /// A part without a corner of certainly positive value has no area and is not added.
+    pub fn push_clipped(&mut self, polygon: &[DVec2], f: &Linear) -> bool {
+        let begin = self.corners.len();
+        let mut any_positive = false;
+        let Some(&last) = polygon.last() else { return false };
+        let (mut previous, mut previous_value) = (last, f.at(last));
+        for &corner in polygon {
+            let value = f.at(corner);
+            any_positive |= value > 0.0;
+            if value * previous_value < 0.0 {
+                // The same expression for both orders of the end points, so that the two parts of
+                // a cut polygon, and the two sides of a shared edge, get the same new corner.
+                let (p, fp, q, fq) = if value > 0.0 {
+                    (corner, value, previous, previous_value)
+                } else {
+                    (previous, previous_value, corner, value)
+                };
+                self.corners.push(p + (q - p) * (fp / (fp - fq)));
+            }
+            if value >= 0.0 {
+                self.corners.push(corner);
+            }
+            (previous, previous_value) = (corner, value);
+        }
+        if any_positive && self.corners.len() - begin >= 3 {
+            self.ends.push(self.corners.len());
+            true
+        } else {
+            self.corners.truncate(begin);
+            false
+        }
+    }
+
+    /// Removes every piece from number `count` on.
+    pub fn truncate(&mut self, count: usize) {
+        self.ends.truncate(count);
+        self.corners.truncate(self.ends.last().copied().unwrap_or(0));
+    }
+}
+
+/// The negative of a linear function.
+pub fn opposite(f: &Linear) -> Linear {
+    Linear { g: -f.g, c: -f.c, uncertainty: f.uncertainty }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_keeps_the_area() {
+        let square = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
+        for (angle, c) in [(0.1f64, -0.3), (1.0, -0.9), (2.5, 0.2), (0.0, -1.0), (0.0, 0.5)] {
+            let f = Linear { g: DVec2::from_angle(angle), c, uncertainty: 1e-15 };
+            let mut pieces = Pieces::default();
+            pieces.push_clipped(&square, &f);
+            pieces.push_clipped(&square, &opposite(&f));
+            let area: f64 = pieces.iter().map(twice_area).sum();
+            assert!((area - 2.0).abs() < 1e-15, "{angle} {c}");
+        }
+    }
+}

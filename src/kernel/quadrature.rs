@@ -1,0 +1,72 @@
+//! Gauss rules for polygons that are far away compared with their size.
+//!
+//! The polygon is cut into a fan of triangles; each takes a tensor Gauss rule on the unit simplex
+//! by the collapsing map (s, t) -> (s (1 - t), s t), whose Jacobian s is kept in the weights.
+
+use std::sync::LazyLock;
+
+use glam::DVec2;
+
+use super::gauss;
+use super::{Moments, View};
+
+/// Largest number of points a direction.
+const MOST_POINTS: usize = 16;
+
+/// One rule on the unit simplex {x, y >= 0, x + y <= 1}, weights summing to 1/2.
+struct Rule {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    weight: Vec<f64>,
+}
+
+static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {
+    (0..=MOST_POINTS)
+        .map(|n| {
+            let (nodes, weights) = gauss::legendre(n);
+            let mut rule = Rule { x: vec![], y: vec![], weight: vec![] };
+            for (s, ws) in nodes.iter().zip(&weights) {
+                for (t, wt) in nodes.iter().zip(&weights) {
+                    rule.x.push(s * (1.0 - t));
+                    rule.y.push(s * t);
+                    rule.weight.push(ws * wt * s);
+                }
+            }
+            rule
+        })
+        .collect()
+});
+
+/// Points a direction that reach 1e-12 for a polygon of radius `ratio` times its distance.
+pub fn points_for(ratio: f64) -> usize {
+    const LADDER: [(f64, usize); 5] =
+        [(0.125, 11), (0.0625, 8), (0.03125, 6), (0.015, 5), (0.002, 4)];
+    LADDER.iter().find(|(above, _)| ratio > *above).map_or(3, |(_, n)| *n)
+}
+
+/// Integrals over a convex polygon with `points` Gauss points a direction and triangle (1 to 16).
+pub fn moments(view: &View, polygon: &[DVec2], about: DVec2, points: usize) -> Moments {
+    let rule = &RULES[points.clamp(1, MOST_POINTS)];
+    let mut sum = Moments::default();
+    let origin = polygon[0];
+    let d2 = view.d * view.d;
+    for pair in polygon[1..].windows(2) {
+        let (e1, e2) = (pair[0] - origin, pair[1] - origin);
+        let shift = origin - view.foot;
+        let (mut m0, mut mx, mut my) = (0.0, 0.0, 0.0);
+        for ((&x, &y), &w) in rule.x.iter().zip(&rule.y).zip(&rule.weight) {
+            let (ox, oy) = (x * e1.x + y * e2.x, x * e1.y + y * e2.y);
+            let (rx, ry) = (shift.x + ox, shift.y + oy);
+            let s = rx * rx + ry * ry + d2;
+            let g = w * (view.a.x * rx + view.a.y * ry - view.c * view.d) / (s * s);
+            m0 += g;
+            mx += g * ox;
+            my += g * oy;
+        }
+        let scale = view.d * e1.perp_dot(e2);
+        // First moments about the fan's own corner, then moved: no cancellation.
+        sum.zeroth += scale * m0;
+        sum.first += scale * (DVec2::new(mx, my) + m0 * (origin - about));
+    }
+    sum
+}
