@@ -4,8 +4,12 @@
 pub mod error;
 pub mod geometry;
 pub mod kernel;
+pub mod mesh;
 pub mod monitor;
+pub mod operator;
 pub mod scene;
+pub mod solve;
+pub mod visibility;
 
 pub use error::{Error, Result};
 pub use monitor::Monitor;

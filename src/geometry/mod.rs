@@ -1,12 +1,14 @@
 //! f64 planes, convex polygons, bounds, rays and signed predicates. Knows nothing of light.
 
 pub mod bounds;
+pub mod box_tree;
 pub mod circle;
 pub mod frame;
 pub mod polygon;
 pub mod ray;
 
 pub use bounds::Bounds;
+pub use box_tree::BoxTree;
 pub use frame::Frame;
 pub use polygon::{Linear, Pieces};
 

@@ -1,0 +1,251 @@
+//! The blockers of light: convex polygons merged from coplanar triangles, in a box tree.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use crate::geometry::{Bounds, BoxTree, COINCIDENCE, Frame};
+
+/// All occluders of a scene.
+pub struct Occluders {
+    corners: Vec<DVec3>,
+    ends: Vec<usize>,
+    planes: Vec<(DVec3, DVec3)>,
+    /// Triangles of the input that each occluder covers, end to end.
+    members: Vec<u32>,
+    member_ends: Vec<usize>,
+    pub(super) tree: BoxTree,
+    /// Largest coordinate of the scene in size; what roundings are relative to.
+    pub magnitude: f64,
+}
+
+impl Occluders {
+    /// Occluders of a list of triangles with area.
+    ///
+    /// Triangles with the same corners (the two sides of a plate) become one. Triangles in one
+    /// plane that share an edge are joined while the result is convex (Hertel & Mehlhorn 1983):
+    /// fewer cuts later, the same set of points.
+    pub fn build(triangles: &[[DVec3; 3]]) -> Occluders {
+        let magnitude = triangles.iter().flatten().map(|x| x.abs().max_element()).fold(0.0, f64::max);
+        let merged = merge(triangles, COINCIDENCE * magnitude);
+        let mut occluders = Occluders {
+            corners: vec![],
+            ends: vec![],
+            planes: vec![],
+            members: vec![],
+            member_ends: vec![],
+            tree: BoxTree::build(&[]),
+            magnitude,
+        };
+        let mut boxes = vec![];
+        for polygon in merged {
+            boxes.push(Bounds::of(&polygon.corners));
+            occluders.planes.push((polygon.corners[0], polygon.normal));
+            occluders.corners.extend(polygon.corners);
+            occluders.ends.push(occluders.corners.len());
+            occluders.members.extend(polygon.members);
+            occluders.member_ends.push(occluders.members.len());
+        }
+        occluders.tree = BoxTree::build(&boxes);
+        occluders
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// Corners of occluder `i`, in order around its normal.
+    pub fn corners(&self, i: usize) -> &[DVec3] {
+        let begin = if i == 0 { 0 } else { self.ends[i - 1] };
+        &self.corners[begin..self.ends[i]]
+    }
+
+    /// A point and the unit normal of the plane of occluder `i`.
+    pub fn plane(&self, i: usize) -> (DVec3, DVec3) {
+        self.planes[i]
+    }
+
+    /// Indices of the triangles that occluder `i` was joined from.
+    pub fn members(&self, i: usize) -> &[u32] {
+        let begin = if i == 0 { 0 } else { self.member_ends[i - 1] };
+        &self.members[begin..self.member_ends[i]]
+    }
+
+    /// A coordinate's uncertainty, in metres.
+    pub fn coincidence(&self) -> f64 {
+        COINCIDENCE * self.magnitude
+    }
+}
+
+struct Merged {
+    corners: Vec<DVec3>,
+    normal: DVec3,
+    members: Vec<u32>,
+}
+
+/// Joins coplanar neighbours into convex polygons. Corners farther than `tolerance` from a plane
+/// are not on it.
+fn merge(triangles: &[[DVec3; 3]], tolerance: f64) -> Vec<Merged> {
+    let key = |x: DVec3| (x + 0.0).to_array().map(f64::to_bits);
+    let mut ids = HashMap::new();
+    let mut points: Vec<DVec3> = vec![];
+    let mut seen = HashMap::new();
+    // Polygons as loops of point ids; a loop that was joined to another is left empty.
+    let mut loops: Vec<Vec<u32>> = vec![];
+    let mut members: Vec<Vec<u32>> = vec![];
+    let mut frames: Vec<Frame> = vec![];
+    for (index, triangle) in triangles.iter().enumerate() {
+        let Some(frame) = Frame::of_triangle(triangle) else { continue };
+        let corners = triangle.map(|x| {
+            *ids.entry(key(x)).or_insert_with(|| {
+                points.push(x);
+                points.len() as u32 - 1
+            })
+        });
+        let mut sorted = corners;
+        sorted.sort_unstable();
+        if let Some(&twin) = seen.get(&sorted) {
+            let list: &mut Vec<u32> = &mut members[twin];
+            list.push(index as u32);
+            continue;
+        }
+        seen.insert(sorted, loops.len());
+        loops.push(corners.to_vec());
+        members.push(vec![index as u32]);
+        frames.push(frame);
+    }
+
+    let mut sides: HashMap<(u32, u32), Vec<usize>> = HashMap::new();
+    for (i, corners) in loops.iter().enumerate() {
+        for k in 0..3 {
+            sides.entry((corners[k], corners[(k + 1) % 3])).or_default().push(i);
+        }
+    }
+    // Edges between exactly two triangles that turn the same way, longest first: diagonals go
+    // before the short edges of slivers. Ties by index keep the order fixed.
+    let mut shared: Vec<(f64, usize, usize, u32, u32)> = vec![];
+    for (&(a, b), left) in &sides {
+        if let (true, [p], Some([q])) = (a < b, &left[..], sides.get(&(b, a)).map(|v| &v[..])) {
+            shared.push((points[a as usize].distance_squared(points[b as usize]), *p, *q, a, b));
+        }
+    }
+    shared.sort_by(|x, y| y.0.total_cmp(&x.0).then((x.1, x.2, x.3, x.4).cmp(&(y.1, y.2, y.3, y.4))));
+
+    let mut owner: Vec<usize> = (0..loops.len()).collect();
+    let find = |owner: &[usize], mut i: usize| {
+        while owner[i] != i {
+            i = owner[i];
+        }
+        i
+    };
+    for (_, p, q, a, b) in shared {
+        let (p, q) = (find(&owner, p), find(&owner, q));
+        if p == q {
+            continue;
+        }
+        let coplanar =
+            loops[q].iter().all(|&x| frames[p].height(points[x as usize]).abs() <= tolerance)
+                && loops[p].iter().all(|&x| frames[q].height(points[x as usize]).abs() <= tolerance)
+                && frames[p].n.dot(frames[q].n) > 0.0;
+        if !coplanar {
+            continue;
+        }
+        if let Some(joined) = join(&loops[p], &loops[q], a, b, &points, &frames[p], tolerance) {
+            loops[p] = joined;
+            loops[q] = vec![];
+            let moved = std::mem::take(&mut members[q]);
+            members[p].extend(moved);
+            owner[q] = p;
+        }
+    }
+    loops
+        .into_iter()
+        .zip(members)
+        .zip(frames)
+        .filter(|((corners, _), _)| !corners.is_empty())
+        .map(|((corners, mut members), frame)| {
+            members.sort_unstable();
+            let corners = corners.iter().map(|&i| points[i as usize]).collect();
+            Merged { corners, normal: frame.n, members }
+        })
+        .collect()
+}
+
+/// The union of two convex loops over their common edge a -> b (b -> a in the second), if convex.
+/// Corners at which it runs straight on are left out.
+fn join(
+    p: &[u32],
+    q: &[u32],
+    a: u32,
+    b: u32,
+    points: &[DVec3],
+    frame: &Frame,
+    tolerance: f64,
+) -> Option<Vec<u32>> {
+    let at = |l: &[u32], x: u32| l.iter().position(|&y| y == x);
+    let (ia, ib) = (at(p, a)?, at(p, b)?);
+    let (jb, ja) = (at(q, b)?, at(q, a)?);
+    if (ia + 1) % p.len() != ib || (jb + 1) % q.len() != ja {
+        return None;
+    }
+    // b ... a around p, then what follows a in q up to before b.
+    let mut loop_ids: Vec<u32> = (0..p.len()).map(|k| p[(ib + k) % p.len()]).collect();
+    loop_ids.extend((1..q.len() - 1).map(|k| q[(ja + k) % q.len()]));
+    let n = loop_ids.len();
+    let place: Vec<_> = loop_ids.iter().map(|&i| frame.project(points[i as usize])).collect();
+    let mut kept = vec![];
+    for k in 0..n {
+        let (before, here, after) = (place[(k + n - 1) % n], place[k], place[(k + 1) % n]);
+        let (to, from) = (here - before, after - here);
+        let turn = to.perp_dot(from);
+        let noise = tolerance * (to.length() + from.length());
+        if turn < -noise || (turn <= noise && to.dot(from) < 0.0) {
+            return None;
+        }
+        if turn > noise {
+            kept.push(loop_ids[k]);
+        }
+    }
+    (kept.len() >= 3).then_some(kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fan_of_triangles_becomes_its_outline() {
+        let rim: Vec<DVec3> = (0..8)
+            .map(|k| {
+                let (s, c) = (std::f64::consts::TAU * k as f64 / 8.0).sin_cos();
+                DVec3::new(c, s, 0.5)
+            })
+            .collect();
+        let fan: Vec<[DVec3; 3]> =
+            (0..8).map(|k| [DVec3::new(0.0, 0.0, 0.5), rim[k], rim[(k + 1) % 8]]).collect();
+        let occluders = Occluders::build(&fan);
+        assert_eq!(occluders.len(), 1);
+        assert_eq!(occluders.corners(0).len(), 8);
+        assert_eq!(occluders.members(0), [0, 1, 2, 3, 4, 5, 6, 7]);
+    }
+
+    #[test]
+    fn both_sides_of_a_plate_are_one_and_an_l_stays_two() {
+        let p = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        let square = [[p(0., 0.), p(1., 0.), p(1., 1.)], [p(0., 0.), p(1., 1.), p(0., 1.)]];
+        let under = square.map(|t| [t[0], t[2], t[1]]);
+        let plate: Vec<_> = square.into_iter().chain(under).collect();
+        assert_eq!(Occluders::build(&plate).len(), 1);
+        let mut l = square.to_vec();
+        l.extend([[p(1., 0.), p(2., 0.), p(1., 1.)]]);
+        assert_eq!(Occluders::build(&l).len(), 1);
+        l.extend([[p(0., 1.), p(0.5, 1.), p(0., 2.)]]);
+        assert_eq!(Occluders::build(&l).len(), 2);
+    }
+}

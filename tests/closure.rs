@@ -1,0 +1,94 @@
+//! Physics that must hold to rounding: closure, furnaces, invariance.
+
+mod common;
+
+use common::{box_room, mesh_of, occluders_of, rotated, scene_of};
+use glam::{DMat3, DVec3};
+use lumel::mesh::{Basis, Refinement};
+use lumel::monitor::Monitor;
+use lumel::operator::ExactOperator;
+use lumel::solve::{SolveOptions, solve};
+
+fn operator(scene: &lumel::scene::Scene, basis: Basis, levels: u32) -> ExactOperator {
+    let mesh = mesh_of(scene, basis, Refinement::Levels(levels));
+    ExactOperator::build(&mesh, &occluders_of(scene), u64::MAX, &Monitor::silent()).unwrap()
+}
+
+fn worst(sums: &[f64]) -> f64 {
+    sums.iter().map(|s| (s - 1.0).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn an_empty_box_is_closed() {
+    for basis in [Basis::Constant, Basis::Linear] {
+        let sums = operator(&box_room(&[]), basis, 2).row_sums();
+        assert!(worst(&sums) < 1e-13, "{:e}", worst(&sums));
+    }
+}
+
+#[test]
+fn a_box_with_blocks_inside_is_closed() {
+    let blocks = [
+        (DVec3::new(0.3, 0.3, 0.2), DVec3::new(0.5, 0.6, 0.7)),
+        (DVec3::new(0.6, 0.25, 0.1), DVec3::new(0.8, 0.5, 0.3)),
+    ];
+    for basis in [Basis::Constant, Basis::Linear] {
+        let sums = operator(&box_room(&blocks), basis, 2).row_sums();
+        assert!(worst(&sums) < 1e-12, "{:e}", worst(&sums));
+        let turned = rotated(
+            &box_room(&blocks),
+            DMat3::from_axis_angle(DVec3::new(0.3, -0.5, 0.7).normalize(), 0.9),
+            1e3,
+            DVec3::new(10.0, -4e3, 3.0),
+        );
+        let sums = operator(&turned, basis, 1).row_sums();
+        assert!(worst(&sums) < 1e-10, "{:e}", worst(&sums));
+    }
+}
+
+#[test]
+fn a_furnace_is_uniform() {
+    let scene = box_room(&[(DVec3::new(0.3, 0.3, 0.2), DVec3::new(0.5, 0.6, 0.7))]);
+    let operator = operator(&scene, Basis::Linear, 1);
+    let n = operator.row_sums().len();
+    for rho in [0.1, 0.5, 0.9, 0.99] {
+        let solution = solve(
+            &|u, out| operator.apply(u, out),
+            &vec![DVec3::splat(rho); n],
+            &vec![DVec3::new(1.0, 2.0, 0.0); n],
+            &SolveOptions { residual: 1e-13, most_iterations: 500 },
+            &Monitor::silent(),
+        )
+        .unwrap();
+        let want = DVec3::new(1.0, 2.0, 0.0) / (1.0 - rho);
+        for u in &solution.radiosity {
+            assert!((*u - want).abs().max_element() <= 1e-9 * want.y, "{rho}: {u} not {want}");
+        }
+    }
+}
+
+#[test]
+fn scenes_of_one_shape_have_one_solution() {
+    let scene = scene_of("plates and a lamp");
+    let irradiance = |scene: &lumel::scene::Scene| {
+        let mesh = mesh_of(scene, Basis::Linear, Refinement::Levels(2));
+        let occluders = occluders_of(scene);
+        let operator =
+            ExactOperator::build(&mesh, &occluders, u64::MAX, &Monitor::silent()).unwrap();
+        let (rho, e) = lumel::mesh::appearance(scene, &mesh);
+        let options = SolveOptions { residual: 1e-13, most_iterations: 500 };
+        solve(&|u, out| operator.apply(u, out), &rho, &e, &options, &Monitor::silent())
+            .unwrap()
+            .irradiance
+    };
+    let base = irradiance(&scene);
+    let largest = base.iter().map(|h| h.x).fold(0.0, f64::max);
+    for (scale, shift) in
+        [(1.0, DVec3::ZERO), (1e-3, DVec3::ZERO), (1e3, DVec3::ZERO), (1.0, DVec3::splat(10.0))]
+    {
+        let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 2.1);
+        let moved = irradiance(&rotated(&scene, turn, scale, shift));
+        let worst = base.iter().zip(&moved).map(|(a, b)| (a.x - b.x).abs()).fold(0.0, f64::max);
+        assert!(worst <= 1e-9 * largest, "scale {scale}, shift {shift}: {:e}", worst / largest);
+    }
+}
