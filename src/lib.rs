@@ -3,6 +3,7 @@
 
 pub mod error;
 pub mod monitor;
+pub mod output;
 pub mod scene;
 
 pub use error::{Error, Result};
