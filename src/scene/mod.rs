@@ -3,12 +3,53 @@
 //! A scene file is read into plain data here and nowhere else. Every oddity of the input is
 //! resolved in this room; what was resolved is listed in [`Scene::notices`], so that later rooms
 //! see only finite, non-degenerate, distinct triangles in metres, right-handed axes.
+//!
+//! | file | subject |
+//! |---|---|
+//! | `read` | which reader a file gets, and the order of the steps |
+//! | `gltf_*` | glTF and GLB |
+//! | `obj_*`, `mtl`, `polygon` | OBJ with MTL |
+//! | `uri` | files that a scene file refers to |
+//! | `overrides` | what the command line changes in materials |
+//! | `hygiene` | degenerate and duplicate triangles |
+//! | `texture`, `appearance` | images, and averages of what varies over a surface |
+//! | `camera`, `default_view` | views |
+//! | `limits`, `notices` | bounds of what is accepted, and the list of oddities |
 
+mod appearance;
+mod camera;
+mod default_view;
+mod gltf_accessor;
+mod gltf_buffers;
+mod gltf_exact;
+mod gltf_file;
+mod gltf_guard;
+mod gltf_material;
+mod gltf_mesh;
+mod gltf_nodes;
+mod hygiene;
+mod limits;
+mod mtl;
+mod notices;
+mod obj_file;
+mod obj_text;
+mod overrides;
+mod polygon;
+mod read;
+mod texture;
+mod uri;
 
 use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
 
+pub use appearance::{exitance, reflectance};
+pub use camera::{Camera, Projection, look_at};
+pub use default_view::default_camera;
+pub use limits::MAX_REFLECTANCE;
+pub use overrides::Override;
+pub use read::{ReadOptions, read};
+pub use texture::{Texture, TextureUse, Wrap};
 
 /// A whole scene, in world space.
 #[derive(Clone, Debug, Default)]
@@ -56,7 +97,8 @@ pub struct Triangle {
 pub struct Material {
     /// Name in the file, or one made from its place there.
     pub name: String,
-    /// Reflectance rho, per channel, in [0, 1); multiplied by texture and vertex colour.
+    /// Reflectance rho, per channel, in [0, [`MAX_REFLECTANCE`]]; multiplied by texture and
+    /// vertex colour.
     pub reflectance: DVec3,
     /// Texture that multiplies the reflectance.
     pub reflectance_texture: Option<TextureUse>,
@@ -84,36 +126,71 @@ pub struct Notice {
     pub count: usize,
 }
 
-/// A decoded image. (Being written: see `texture`.)
-#[derive(Clone, Debug, Default)]
-pub struct Texture;
+impl Scene {
+    /// The corners of the smallest axis-parallel box that holds all triangles: least, greatest.
+    /// Both are zero for a scene without triangles, which no reader returns.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let mut corners = self.triangles.iter().flat_map(|t| t.vertices);
+        let Some(first) = corners.next() else {
+            return (DVec3::ZERO, DVec3::ZERO);
+        };
+        corners.fold((first, first), |(low, high), p| (low.min(p), high.max(p)))
+    }
 
-/// How a material uses a texture.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TextureUse;
+    /// The largest side of [`Scene::bounds`], metres.
+    pub fn extent(&self) -> f64 {
+        let (low, high) = self.bounds();
+        (high - low).max_element()
+    }
 
-/// A view of the scene.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Camera {
-    /// Name in the file, or one made from its place there.
-    pub name: String,
-    /// Position of the eye, metres.
-    pub eye: DVec3,
-    /// Unit vector to the right of the picture.
-    pub right: DVec3,
-    /// Unit vector to the top of the picture.
-    pub up: DVec3,
-    /// Unit vector into the picture.
-    pub forward: DVec3,
-    /// How points are projected.
-    pub projection: Projection,
+    /// Whether a material emits light in any channel, somewhere on its texture. An index past the
+    /// end emits nothing.
+    pub fn emits(&self, material: usize) -> bool {
+        self.materials.get(material).is_some_and(|m| m.radiance.max_element() > 0.0)
+    }
+
+    /// Unit normal, on the side from which the corners run counter-clockwise, and area in square
+    /// metres of a triangle.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such triangle.
+    pub fn triangle_normal_and_area(&self, triangle: usize) -> (DVec3, f64) {
+        self.triangles[triangle].normal_and_area()
+    }
 }
 
-/// Projection of a camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Projection {
-    /// Full vertical field of view, radians; width over height where the file fixes it.
-    Perspective { vertical_fov: f64, aspect: Option<f64> },
-    /// Half width and half height of the view, metres.
-    Orthographic { half_width: f64, half_height: f64 },
+impl Triangle {
+    /// Unit normal and area; the normal is zero for a triangle that [`read`] would have dropped.
+    pub fn normal_and_area(&self) -> (DVec3, f64) {
+        let [a, b, c] = self.vertices;
+        let double = (b - a).cross(c - a);
+        let length = double.length();
+        if length > 0.0 { (double / length, 0.5 * length) } else { (DVec3::ZERO, 0.0) }
+    }
+
+    /// The same face seen from behind: winding and everything given by corner reversed.
+    pub(crate) fn reverse(&mut self) {
+        self.vertices.swap(1, 2);
+        self.colour.swap(1, 2);
+        for set in &mut self.uv {
+            set.swap(1, 2);
+        }
+    }
+}
+
+impl Material {
+    /// A material without textures, metal or emission, one-sided.
+    pub fn plain(name: impl Into<String>, reflectance: DVec3) -> Self {
+        Material {
+            name: name.into(),
+            reflectance,
+            reflectance_texture: None,
+            metallic: 0.0,
+            metallic_texture: None,
+            radiance: DVec3::ZERO,
+            radiance_texture: None,
+            two_sided: false,
+        }
+    }
 }
