@@ -174,6 +174,12 @@ fn outputs_that_cannot_be_written_are_found_before_the_work() {
 }
 
 #[test]
+fn a_time_limit_that_runs_out_has_exit_code_4() {
+    let room = room();
+    fails(room.path(), "inspect room.gltf --time-limit 1e-9", 4, &["--time-limit"]);
+}
+
+#[test]
 fn inspect_prints_what_was_read() {
     let room = room();
     let output = lumel(room.path(), "inspect room.gltf");

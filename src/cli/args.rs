@@ -60,7 +60,7 @@ pub struct InspectArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Print JSON instead of text
-    #[arg(long)]
+    #[arg(long, help_heading = None::<&str>)]
     pub json: bool,
     /// The view to check.
     #[command(flatten)]
@@ -88,7 +88,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Picture to write; the extension decides: .exr (linear), .png (sRGB), .hdr (linear)
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", help_heading = None::<&str>)]
     pub output: PathBuf,
     /// The view.
     #[command(flatten)]
@@ -120,10 +120,10 @@ pub struct ProbeArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Table of points to measure at, with the header x,y,z,nx,ny,nz
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = None::<&str>)]
     pub points: PathBuf,
     /// Table to write [default: standard output]
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", help_heading = None::<&str>)]
     pub output: Option<PathBuf>,
     /// How to solve.
     #[command(flatten)]
@@ -138,7 +138,7 @@ pub struct ProbeArgs {
 #[command(next_help_heading = "Scene")]
 pub struct SceneArgs {
     /// Scene to read: .gltf, .glb or .obj
-    #[arg(value_name = "SCENE")]
+    #[arg(value_name = "SCENE", help_heading = None::<&str>)]
     pub scene: PathBuf,
     /// Let materials emit this radiance, W/(m^2 sr), e.g. 'Lamp*=40,38,30'; may be repeated
     #[arg(long, value_name = "NAME=R,G,B", value_parser = Override::parse)]
@@ -158,7 +158,7 @@ pub struct SceneArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "View")]
 pub struct ViewArgs {
-    /// Camera of the file, by its name or its number from 0 [default: the first]
+    /// Camera of the file, by name or number from 0 [default: the first, or one that suits the scene]
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
     /// Stand here instead of at a camera of the file, metres, e.g. 0,1.6,4

@@ -4,6 +4,7 @@
 //! no failure. Errors and warnings go to standard error; when even that cannot be written there
 //! is nobody left to tell, and the exit code still says it.
 
+use std::collections::HashMap;
 use std::error::Error as _;
 use std::io::{self, Write};
 
@@ -32,11 +33,39 @@ pub fn print_error(error: &Error) {
     let _ = io::stderr().write_all(text.as_bytes());
 }
 
-/// Writes what was odd in a scene to standard error, a line each.
+/// Writes what was odd in a scene to standard error, a line for each kind of oddity.
 pub fn print_warnings(notices: &[Notice]) {
-    let lines: String =
-        notices.iter().map(|notice| format!("Warning: {}\n", line(notice))).collect();
+    let lines: String = grouped(notices).iter().map(|line| format!("Warning: {line}\n")).collect();
     let _ = io::stderr().write_all(lines.as_bytes());
+}
+
+/// Notices that say the same of several things, in one line that names the first of them.
+fn grouped(notices: &[Notice]) -> Vec<String> {
+    // The first notice with each text and how many further ones there are, in order; the map
+    // only finds the place.
+    let mut groups: Vec<(Notice, usize)> = Vec::new();
+    let mut places: HashMap<&str, usize> = HashMap::new();
+    for notice in notices {
+        match places.get(notice.text.as_str()) {
+            Some(&place) => {
+                groups[place].0.count += notice.count;
+                groups[place].1 += 1;
+            }
+            None => {
+                places.insert(&notice.text, groups.len());
+                groups.push((notice.clone(), 0));
+            }
+        }
+    }
+    groups
+        .into_iter()
+        .map(|(mut notice, others)| {
+            if others > 0 {
+                notice.about.push_str(&format!(" and {others} more"));
+            }
+            line(&notice)
+        })
+        .collect()
 }
 
 /// A notice in one line.
@@ -44,4 +73,31 @@ pub fn line(notice: &Notice) -> String {
     let Notice { about, text, count } = notice;
     let times = if *count > 1 { format!(" ({count} times)") } else { String::new() };
     format!("{about}: {text}{times}").replace('\n', " ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notices_with_one_text_become_one_line_in_the_order_of_the_first() {
+        let notice = |about: &str, text: &str, count| Notice {
+            about: about.into(),
+            text: text.into(),
+            count,
+        };
+        let notices = [
+            notice("material \"a\"", "gloss is left out", 1),
+            notice("mesh 2", "lines\nare left out", 7),
+            notice("material \"b\"", "gloss is left out", 1),
+            notice("material \"c\"", "gloss is left out", 1),
+        ];
+        assert_eq!(
+            grouped(&notices),
+            [
+                "material \"a\" and 2 more: gloss is left out (3 times)",
+                "mesh 2: lines are left out (7 times)",
+            ]
+        );
+    }
 }

@@ -10,7 +10,7 @@
 //! One thread is used: the crate's own pool would not know how many threads the user allows.
 //!
 //! **The same bytes each time**: the `exr` crate keeps further attributes in a map of random
-//! order, so [`sort_attributes`] puts the header in the order of names afterwards (the order that
+//! order, so `sort_attributes` puts the header in the order of names afterwards (the order that
 //! the reference implementation writes). Its length does not change, and neither do the
 //! offsets of the pixel blocks.
 

@@ -48,8 +48,8 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>> {
 
 /// The nearest colour that RGBE holds exactly.
 fn representable(pixel: [f32; 3]) -> [f32; 3] {
-    // `max` of NaN and 0 is 0.
-    let pixel = pixel.map(|c| f64::from(c).max(0.0).min(LARGEST));
+    let limited = |c: f64| if c > 0.0 { c.min(LARGEST) } else { 0.0 };
+    let pixel = pixel.map(|c| limited(f64::from(c)));
     let largest = pixel[0].max(pixel[1]).max(pixel[2]);
     if largest < f64::MIN_POSITIVE {
         return [0.0; 3];

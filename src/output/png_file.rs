@@ -37,9 +37,9 @@ pub fn encode(picture: &Picture, options: &PictureOptions) -> Result<Vec<u8>> {
     };
     let factor = options.exposure_ev.exp2();
     let level = |linear: f32| {
-        // `max` of NaN and 0 is 0.
-        let c = (f64::from(linear) * factor).max(0.0).min(1.0);
-        (srgb_from_linear(c) * levels).round() as u16
+        let c = f64::from(linear) * factor;
+        let limited = if c > 0.0 { c.min(1.0) } else { 0.0 };
+        (srgb_from_linear(limited) * levels).round() as u16
     };
     let values = picture.pixels.iter().flatten().map(|&c| level(c));
     let (depth, data): (_, Vec<u8>) = if options.png_bits == 8 {
