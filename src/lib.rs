@@ -7,6 +7,7 @@ pub mod kernel;
 pub mod mesh;
 pub mod monitor;
 pub mod operator;
+pub mod output;
 pub mod scene;
 pub mod solve;
 pub mod visibility;

@@ -5,6 +5,7 @@
 //! midpoints are joined, four congruent children ([AC] section 2). The elements of a root are its
 //! finest triangles in the order of its quadtree, so each subtree is a range of elements.
 
+mod appearance;
 mod build;
 mod refine;
 
@@ -12,6 +13,7 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::{Bounds, Frame};
 
+pub use appearance::{appearance, face_weights};
 pub use build::{MeshOptions, build};
 pub use refine::{Refinement, child, level_for};
 

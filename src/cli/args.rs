@@ -1,0 +1,282 @@
+//! What was typed, and nothing done with it yet.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use glam::DVec3;
+use lumel::scene::Override;
+
+use super::values::{self, MemorySize};
+
+/// Help that follows the list of commands.
+const AFTER_HELP: &str = "\
+Examples:
+  lumel inspect room.gltf
+      What is in the file: faces, materials, lamps, cameras, and what was odd.
+  lumel render room.gltf -o view.png --max-edge 0.1 --gather
+      The view of the file's first camera, from elements of at most 10 cm.
+  lumel probe room.obj --points desk.csv -o lux.csv --emission 'Lamp*=40,38,30'
+      Irradiance at given points, with the radiance of the lamps set by hand.
+
+Exit codes: 0 done, 1 failed at run time, 2 wrong usage, 3 bad scene or points,
+4 tolerance or time limit not met, 130 interrupted.";
+
+/// The program's command line.
+#[derive(Debug, Parser)]
+#[command(
+    name = "lumel",
+    version,
+    about = "Exact diffuse light: solves the occluded radiosity equation for glTF and OBJ scenes",
+    after_help = AFTER_HELP,
+    max_term_width = 100
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Show what was read: faces, materials, emitters, cameras, warnings
+    Inspect(InspectArgs),
+    /// Make a picture of a scene as a camera sees it
+    Render(RenderArgs),
+    /// Measure irradiance and radiosity at points given in a table
+    Probe(ProbeArgs),
+}
+
+/// `lumel inspect`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  lumel inspect room.gltf
+  lumel inspect room.gltf --json | jq .materials
+  lumel inspect room.obj --eye 0,1.6,4 --look-at 0,1,0    checks a view before rendering it")]
+pub struct InspectArgs {
+    /// The scene and how to read it.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Print JSON instead of text
+    #[arg(long, help_heading = None::<&str>)]
+    pub json: bool,
+    /// The view to check.
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// How to solve.
+    #[command(flatten)]
+    pub solve: SolveArgs,
+    /// How to run.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// `lumel render`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  lumel render room.gltf -o view.exr --max-edge 0.1
+      Linear radiance, in W/(m^2 sr), from the file's first camera.
+  lumel render room.gltf -o view.png --camera Desk --size 1920x1080 --exposure 1.5 --gather
+      One camera by its name, 1.5 stops brighter, with shadows as sharp as they are.
+  lumel render room.obj -o view.png --eye 0,1.6,4 --look-at 0,1,0 --fov 60
+      A view of one's own, for a file without cameras.")]
+pub struct RenderArgs {
+    /// The scene and how to read it.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Picture to write; the extension decides: .exr (linear), .png (sRGB), .hdr (linear)
+    #[arg(short, long, value_name = "FILE", help_heading = None::<&str>)]
+    pub output: PathBuf,
+    /// The view.
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// How to make the picture.
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// How to solve.
+    #[command(flatten)]
+    pub solve: SolveArgs,
+    /// How to run.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// `lumel probe`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+The table of points is comma-separated text whose header names the columns x,y,z (metres) and
+nx,ny,nz (normal); further columns are ignored. Written are these columns and
+irradiance_r,irradiance_g,irradiance_b,radiosity_r,radiosity_g,radiosity_b in W/m^2; the
+radiosity is empty where there is no surface.
+
+Examples:
+  lumel probe room.gltf --points desk.csv -o light.csv --max-edge 0.1
+  printf 'x,y,z,nx,ny,nz\\n0,0.75,0,0,1,0\\n' > p.csv && lumel probe room.gltf --points p.csv")]
+pub struct ProbeArgs {
+    /// The scene and how to read it.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Table of points to measure at, with the header x,y,z,nx,ny,nz
+    #[arg(long, value_name = "FILE", help_heading = None::<&str>)]
+    pub points: PathBuf,
+    /// Table to write [default: standard output]
+    #[arg(short, long, value_name = "FILE", help_heading = None::<&str>)]
+    pub output: Option<PathBuf>,
+    /// How to solve.
+    #[command(flatten)]
+    pub solve: SolveArgs,
+    /// How to run.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// The scene and how to read it.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Scene")]
+pub struct SceneArgs {
+    /// Scene to read: .gltf, .glb or .obj
+    #[arg(value_name = "SCENE", help_heading = None::<&str>)]
+    pub scene: PathBuf,
+    /// Let materials emit this radiance, W/(m^2 sr), e.g. 'Lamp*=40,38,30'; may be repeated
+    #[arg(long, value_name = "NAME=R,G,B", value_parser = Override::parse)]
+    pub emission: Vec<Override>,
+    /// Give materials this diffuse reflectance, 0 to 1, e.g. 'Wall=0.8,0.8,0.7'; may be repeated
+    #[arg(long, value_name = "NAME=R,G,B", value_parser = Override::parse)]
+    pub reflectance: Vec<Override>,
+    /// Let both sides of every surface reflect and emit; otherwise a back is black
+    #[arg(long)]
+    pub two_sided: bool,
+    /// Multiply all emission by this number
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = values::not_negative, allow_negative_numbers = true)]
+    pub light_scale: f64,
+}
+
+/// The view of a picture.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "View")]
+pub struct ViewArgs {
+    /// Camera of the file, by name or number from 0 [default: the first, or one that suits the scene]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<String>,
+    /// Stand here instead of at a camera of the file, metres, e.g. 0,1.6,4
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, requires = "look_at", conflicts_with = "camera", allow_hyphen_values = true)]
+    pub eye: Option<DVec3>,
+    /// Look at this point from --eye
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, requires = "eye", allow_hyphen_values = true)]
+    pub look_at: Option<DVec3>,
+    /// Direction that is up in the picture seen from --eye [default: 0,1,0]
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, requires = "eye", allow_hyphen_values = true)]
+    pub up: Option<DVec3>,
+    /// Vertical field of view from --eye, degrees [default: 45]
+    #[arg(long, value_name = "DEGREES", value_parser = values::field_of_view, requires = "eye", allow_negative_numbers = true)]
+    pub fov: Option<f64>,
+    /// Size of the picture, pixels [default: 960 on its longer side, as wide as the camera says]
+    #[arg(long, value_name = "WxH", value_parser = values::picture_size)]
+    pub size: Option<(u32, u32)>,
+}
+
+/// How to make the picture.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Picture")]
+pub struct PictureArgs {
+    /// Brighten a PNG picture by 2^EV; .exr and .hdr keep the true values
+    #[arg(long, value_name = "EV", default_value = "0", value_parser = values::exposure, allow_negative_numbers = true)]
+    pub exposure: f64,
+    /// Bits a channel of a PNG picture
+    #[arg(long, value_name = "8|16", default_value = "8")]
+    pub bits: BitsArg,
+    /// Gather light at every pixel: exact shadows whatever the mesh, but slower
+    #[arg(long)]
+    pub gather: bool,
+    /// Samples along each side of a pixel: N makes N x N a pixel
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub samples: u32,
+}
+
+/// How to solve.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Solution")]
+pub struct SolveArgs {
+    /// How radiosity varies within an element
+    #[arg(long, value_enum, default_value = "linear")]
+    pub basis: BasisArg,
+    /// Refine until no edge of an element is longer than this, metres
+    #[arg(long, value_name = "LENGTH", value_parser = values::positive, conflicts_with = "subdivide", allow_negative_numbers = true)]
+    pub max_edge: Option<f64>,
+    /// Refine every face this many times, into 4 elements each time
+    #[arg(long, value_name = "LEVELS", value_parser = values::levels, allow_negative_numbers = true)]
+    pub subdivide: Option<u32>,
+    /// Iterate until the relative residual is below this
+    #[arg(long, value_name = "R", default_value = "1e-8", value_parser = values::residual, allow_negative_numbers = true)]
+    pub residual: f64,
+    /// Use no more memory than this: 2GiB, 500MB, 75% (of what there is)
+    #[arg(long, value_name = "SIZE", default_value = "75%", value_parser = values::memory_size, allow_negative_numbers = true)]
+    pub max_memory: MemorySize,
+}
+
+/// How to run.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Run")]
+pub struct RunArgs {
+    /// Give up after this many seconds (exit code 4)
+    #[arg(long, value_name = "SECONDS", value_parser = values::positive, allow_negative_numbers = true)]
+    pub time_limit: Option<f64>,
+    /// Threads to use [default: one for each processor]; results do not depend on it
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Write neither warnings nor progress
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Write times, counts, residuals and warnings to this file as JSON
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+}
+
+/// How radiosity varies within an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BasisArg {
+    /// One value for an element
+    Constant,
+    /// A plane through three values, discontinuous across edges
+    Linear,
+}
+
+/// Bits a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BitsArg {
+    /// 256 levels
+    #[value(name = "8")]
+    Eight,
+    /// 65536 levels
+    #[value(name = "16")]
+    Sixteen,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn negative_numbers_are_values() {
+        let typed = "lumel render s.gltf -o v.png --eye -1,-2,-3 --look-at 0,0,-1 --up 0,-1,0 \
+                     --exposure -2";
+        let Command::Render(args) = Cli::try_parse_from(typed.split_whitespace()).unwrap().command
+        else {
+            panic!("not a render");
+        };
+        assert_eq!(args.view.eye, Some(DVec3::new(-1.0, -2.0, -3.0)));
+        assert_eq!(args.view.up, Some(DVec3::NEG_Y));
+        assert_eq!(args.picture.exposure, -2.0);
+        assert_eq!(args.solve.basis, BasisArg::Linear);
+        assert_eq!(args.solve.max_memory, MemorySize::Share(0.75));
+    }
+}

@@ -1,0 +1,83 @@
+//! The commands, each from its settings to its result.
+
+use lumel::output::csv;
+use lumel::{Error, Monitor, Result};
+
+use super::args::{Cli, Command};
+use super::progress::Progress;
+use super::session::Session;
+use super::settings::{InspectSettings, ProbeSettings, RenderSettings};
+use super::{console, inspect, interrupt, view};
+
+/// Does what was typed.
+pub fn run(cli: Cli) -> Result<()> {
+    interrupt::listen()?;
+    match cli.command {
+        Command::Inspect(args) => inspect(&InspectSettings::new(args)?),
+        Command::Render(args) => render(&RenderSettings::new(args)?),
+        Command::Probe(args) => probe(&ProbeSettings::new(args)),
+    }
+}
+
+fn inspect(settings: &InspectSettings) -> Result<()> {
+    let path = settings.scene.path.as_path();
+    let mut session =
+        Session::begin("inspect", path, &[], None, settings.described(), &settings.run)?;
+    let progress = Progress::new(settings.run.quiet);
+    let tell = |stage, done, total| progress.hear(stage, done, total);
+    let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
+
+    let scene = session.read(&settings.scene, &monitor)?;
+    let view = view::choose(&scene, &settings.view)?;
+    let description = session
+        .clock
+        .time("describe", || inspect::describe(&scene, &view, settings.solve.max_memory));
+    progress.clear();
+    let text = if settings.json {
+        let json = serde_json::to_string_pretty(&description);
+        json.map_err(|e| Error::Runtime(format!("no JSON can be made: {e}")))? + "\n"
+    } else {
+        description.to_text()
+    };
+    console::print(&text)?;
+    session.finish()
+}
+
+fn render(settings: &RenderSettings) -> Result<()> {
+    let path = settings.scene.path.as_path();
+    let output = settings.output.as_path();
+    let mut session =
+        Session::begin("render", path, &[], Some(output), settings.described(), &settings.run)?;
+    let progress = Progress::new(settings.run.quiet);
+    let tell = |stage, done, total| progress.hear(stage, done, total);
+    let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
+
+    let scene = session.read(&settings.scene, &monitor)?;
+    progress.clear();
+    if !settings.run.quiet {
+        console::print_warnings(&scene.notices);
+    }
+    view::choose(&scene, &settings.view)?;
+    Err(Error::Runtime("pictures cannot be rendered in this version".into()))
+}
+
+fn probe(settings: &ProbeSettings) -> Result<()> {
+    let path = settings.scene.path.as_path();
+    let inputs = [settings.points.as_path()];
+    let output = settings.output.as_deref();
+    let mut session =
+        Session::begin("probe", path, &inputs, output, settings.described(), &settings.run)?;
+    let progress = Progress::new(settings.run.quiet);
+    let tell = |stage, done, total| progress.hear(stage, done, total);
+    let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
+
+    // The points first: a mistake in them is found before the scene is read.
+    let points = csv::read_points(&settings.points)?;
+    session.report.count("points", points.len());
+    let scene = session.read(&settings.scene, &monitor)?;
+    progress.clear();
+    if !settings.run.quiet {
+        console::print_warnings(&scene.notices);
+    }
+    Err(Error::Runtime("points cannot be probed in this version".into()))
+}

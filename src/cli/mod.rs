@@ -1,0 +1,17 @@
+//! The front end: what was typed ([`args`]) becomes validated settings ([`settings`]), and a
+//! command ([`commands`]) does the work with them.
+//!
+//! Results go to standard output or a file; progress and warnings go to standard error, and
+//! progress only to a terminal ([`console`], [`progress`]).
+
+pub mod args;
+pub mod commands;
+pub mod console;
+pub mod inspect;
+pub mod interrupt;
+pub mod progress;
+pub mod session;
+pub mod settings;
+pub mod table;
+pub mod values;
+pub mod view;

@@ -1,0 +1,78 @@
+//! What every command does around its own work: checks of the outputs before it, clocks and the
+//! report beside it.
+
+use std::path::{Path, PathBuf};
+
+use lumel::output::atomic::{check_writable, same_file};
+use lumel::output::report::{Report, StageClock};
+use lumel::scene::{self, Scene};
+use lumel::{Error, Monitor, Result};
+
+use super::settings::{Described, RunSettings, SceneSettings};
+
+/// One run of a command.
+pub struct Session {
+    /// Times the stages.
+    pub clock: StageClock,
+    /// What is known about the run so far; stages are added at the end.
+    pub report: Report,
+    report_path: Option<PathBuf>,
+}
+
+impl Session {
+    /// Begins a command: fails early where its `output` or the report could not be written, and
+    /// sets the number of threads. The scene and `inputs` must not be overwritten.
+    pub fn begin(
+        command: &str,
+        scene: &Path,
+        inputs: &[&Path],
+        output: Option<&Path>,
+        settings: Described,
+        run: &RunSettings,
+    ) -> Result<Session> {
+        let inputs = [&[scene], inputs].concat();
+        let report_path = run.report.as_deref();
+        for target in output.into_iter().chain(report_path) {
+            check_writable(target, &inputs)?;
+        }
+        if let (Some(output), Some(report)) = (output, report_path)
+            && same_file(output, report)
+        {
+            return Err(Error::Usage(format!(
+                "--output and --report are the same file, {}; give them different names",
+                output.display()
+            )));
+        }
+        if let Some(threads) = run.threads {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build_global()
+                .map_err(|e| Error::Runtime(format!("{threads} threads cannot be had: {e}")))?;
+        }
+        let mut report = Report::new(command, scene);
+        report.settings = settings.into_iter().collect();
+        Ok(Session { clock: StageClock::new(), report, report_path: run.report.clone() })
+    }
+
+    /// Reads the scene and notes what was found.
+    pub fn read(&mut self, settings: &SceneSettings, monitor: &Monitor) -> Result<Scene> {
+        let stage = monitor.stage("read", 1);
+        let scene = self.clock.time("read", || scene::read(&settings.path, &settings.options))?;
+        stage.advance(1)?;
+        self.report.count("objects", scene.objects.len());
+        self.report.count("faces", scene.triangles.len());
+        self.report.count("materials", scene.materials.len());
+        self.report.count("cameras", scene.cameras.len());
+        self.report.add_notices(&scene.notices);
+        Ok(scene)
+    }
+
+    /// Ends the command: writes the report where one was asked for.
+    pub fn finish(mut self) -> Result<()> {
+        self.report.stages = self.clock.into_stages();
+        match &self.report_path {
+            Some(path) => self.report.write(path),
+            None => Ok(()),
+        }
+    }
+}
