@@ -1,5 +1,6 @@
 //! What a point sees of a triangle, against polygon booleans in integers.
 
+mod found;
 mod look;
 mod oracle;
 mod scenes;
