@@ -1,7 +1,10 @@
 //! The commands, each from its settings to its result.
 
+use lumel::output::camera_matrices::CameraMatrices;
 use lumel::output::csv;
-use lumel::{Error, Monitor, Result};
+use lumel::output::picture::{Picture, Quantity, write_picture};
+use lumel::render::{self, RenderOptions};
+use lumel::{Error, Monitor, Result, probe};
 
 use super::args::{Cli, Command};
 use super::progress::Progress;
@@ -57,8 +60,31 @@ fn render(settings: &RenderSettings) -> Result<()> {
     if !settings.run.quiet {
         console::print_warnings(&scene.notices);
     }
-    view::choose(&scene, &settings.view)?;
-    Err(Error::Runtime("pictures cannot be rendered in this version".into()))
+    let view = view::choose(&scene, &settings.view)?;
+    let light = session.light(&scene, &settings.solve, &monitor)?;
+    let options = RenderOptions {
+        width: view.width,
+        height: view.height,
+        samples: settings.samples,
+        gather: settings.gather,
+    };
+    let pixels = session
+        .clock
+        .time("render", || render::render(&scene, &light, &view.camera, &options, &monitor))?;
+    let mut metadata = settings.metadata();
+    metadata.push(("view".into(), view.camera.name.clone()));
+    let aspect = f64::from(view.width) / f64::from(view.height);
+    let picture = Picture {
+        width: view.width,
+        height: view.height,
+        pixels,
+        quantity: Quantity::Radiance,
+        metadata,
+        camera: Some(CameraMatrices::of(&view.camera, aspect)),
+    };
+    session.clock.time("write", || write_picture(output, &picture, &settings.picture))?;
+    progress.clear();
+    session.finish()
 }
 
 fn probe(settings: &ProbeSettings) -> Result<()> {
@@ -79,5 +105,13 @@ fn probe(settings: &ProbeSettings) -> Result<()> {
     if !settings.run.quiet {
         console::print_warnings(&scene.notices);
     }
-    Err(Error::Runtime("points cannot be probed in this version".into()))
+    let light = session.light(&scene, &settings.solve, &monitor)?;
+    let results =
+        session.clock.time("probe", || probe::probe(&scene, &light, &points, &monitor))?;
+    progress.clear();
+    match output {
+        Some(path) => csv::write_results(path, &points, &results)?,
+        None => console::print(&csv::format_results(&points, &results))?,
+    }
+    session.finish()
 }

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use lumel::output::atomic::{check_writable, same_file};
 use lumel::output::report::{Report, StageClock};
 use lumel::scene::{self, Scene};
+use lumel::solve::light::{self, Light};
 use lumel::{Error, Monitor, Result};
 
-use super::settings::{Described, RunSettings, SceneSettings};
+use super::settings::{Described, RunSettings, SceneSettings, SolveSettings};
 
 /// One run of a command.
 pub struct Session {
@@ -65,6 +66,40 @@ impl Session {
         self.report.count("cameras", scene.cameras.len());
         self.report.add_notices(&scene.notices);
         Ok(scene)
+    }
+
+    /// Solves the scene and notes how it went.
+    pub fn light(
+        &mut self,
+        scene: &Scene,
+        settings: &SolveSettings,
+        monitor: &Monitor,
+    ) -> Result<Light> {
+        let light =
+            self.clock.time("solve", || light::light(scene, &settings.light_options(), monitor))?;
+        let report = &mut self.report;
+        report.count("elements", light.mesh.elements());
+        report.count("nodes", light.mesh.nodes());
+        report.count("occluders", light.occluders.len());
+        report.count("iterations", light.solution.iterations);
+        report.count("operator entries", light.entries);
+        let counts = light.counts;
+        for (name, count) in [
+            ("faces turned away from a node", counts.faces_away),
+            ("faces clear of occluders", counts.faces_clear),
+            ("faces with occluders between", counts.faces_shaded),
+            ("elements fully visible", counts.full),
+            ("elements partly visible", counts.partial),
+            ("elements hidden", counts.hidden),
+        ] {
+            report.count(name, count as usize);
+        }
+        report.value("operator bytes", light.bytes as f64);
+        report.value("operator bytes forecast", light.forecast.bytes as f64);
+        report.value("smallest row sum", light.row_sums.0);
+        report.value("largest row sum", light.row_sums.1);
+        report.channels("residual", light.solution.residual.to_array());
+        Ok(light)
     }
 
     /// Ends the command: writes the report where one was asked for.

@@ -7,9 +7,11 @@
 use std::path::PathBuf;
 
 use glam::DVec3;
+use lumel::mesh::{self, Basis, MeshOptions};
 use lumel::output::machine;
 use lumel::output::picture::{PictureFormat, PictureOptions};
 use lumel::scene::{Override, ReadOptions};
+use lumel::solve::{LightOptions, SolveOptions};
 use lumel::{Error, Result};
 
 use super::args::{
@@ -17,6 +19,9 @@ use super::args::{
     SolveArgs, ViewArgs,
 };
 use super::values::MemorySize;
+
+/// Elements where the user does not say how fine the mesh is.
+const USUAL_ELEMENTS: usize = 2000;
 
 /// Names and values, as written into pictures and reports.
 pub type Described = Vec<(String, String)>;
@@ -69,8 +74,8 @@ pub struct ViewSettings {
 /// How the mesh is refined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refinement {
-    /// The faces as they are.
-    None,
+    /// Until there are about this many elements: enough for a good picture in seconds.
+    Usual,
     /// Until no edge is longer than this, metres.
     MaxEdge(f64),
     /// Each face this many times.
@@ -283,6 +288,24 @@ impl ViewSettings {
 }
 
 impl SolveSettings {
+    /// As the library wants it.
+    pub fn light_options(&self) -> LightOptions {
+        let basis = match self.basis {
+            BasisArg::Constant => Basis::Constant,
+            BasisArg::Linear => Basis::Linear,
+        };
+        let refinement = match self.refinement {
+            Refinement::Usual => mesh::Refinement::Elements(USUAL_ELEMENTS),
+            Refinement::MaxEdge(length) => mesh::Refinement::MaxEdge(length),
+            Refinement::Levels(levels) => mesh::Refinement::Levels(levels),
+        };
+        LightOptions {
+            mesh: MeshOptions { basis, refinement },
+            solve: SolveOptions { residual: self.residual, ..SolveOptions::default() },
+            max_memory: self.max_memory.unwrap_or(u64::MAX),
+        }
+    }
+
     /// What the solution depends on.
     pub fn metadata(&self) -> Described {
         let basis = match self.basis {
@@ -291,7 +314,7 @@ impl SolveSettings {
         };
         let mut list = vec![pair("basis", basis), pair("residual", self.residual)];
         match self.refinement {
-            Refinement::None => {}
+            Refinement::Usual => {}
             Refinement::MaxEdge(length) => list.push(pair("max-edge", length)),
             Refinement::Levels(levels) => list.push(pair("subdivide", levels)),
         }
@@ -359,7 +382,7 @@ fn solve(args: &SolveArgs) -> SolveSettings {
     let refinement = match (args.max_edge, args.subdivide) {
         (Some(length), _) => Refinement::MaxEdge(length),
         (None, Some(levels)) => Refinement::Levels(levels),
-        (None, None) => Refinement::None,
+        (None, None) => Refinement::Usual,
     };
     SolveSettings {
         basis: args.basis,
