@@ -57,7 +57,9 @@ pub enum Error {
         remedy: String,
     },
     /// An iteration stopped without reaching its tolerance.
-    #[error("the solve did not converge: relative residual {residual:.2e} after {iterations} iterations, asked for {tolerance:.2e}")]
+    #[error(
+        "the solve did not converge: relative residual {residual:.2e} after {iterations} iterations, asked for {tolerance:.2e}"
+    )]
     NotConverged {
         /// Relative residual reached.
         residual: f64,
@@ -73,7 +75,9 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
     /// The time limit ran out before there was a result.
-    #[error("the time limit of {0:.1} s ran out before there was a result: raise --time-limit or ask for less")]
+    #[error(
+        "the time limit of {0:.1} s ran out before there was a result: raise --time-limit or ask for less"
+    )]
     TimeLimit(f64),
     /// A file could not be written; what stood there before is unharmed.
     #[error("{}: cannot be written: {reason}", .path.display())]

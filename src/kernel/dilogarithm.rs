@@ -70,7 +70,10 @@ mod tests {
                 let phi = PI * (i as f64 + 0.5) / 30.0;
                 let (x, y) = (r * phi.cos(), r * phi.sin());
                 let (got, want) = (im_li2(x, y), direct(r, phi));
-                assert!((got - want).abs() <= 4e-16 + 2e-15 * want.abs(), "{r} {phi}: {got} {want}");
+                assert!(
+                    (got - want).abs() <= 4e-16 + 2e-15 * want.abs(),
+                    "{r} {phi}: {got} {want}"
+                );
             }
         }
     }

@@ -149,7 +149,9 @@ impl Mesh {
     /// Longest edge of all elements, metres.
     pub fn longest_edge(&self) -> f64 {
         let square = |t: &[DVec2; 3]| {
-            t[0].distance_squared(t[1]).max(t[1].distance_squared(t[2])).max(t[2].distance_squared(t[0]))
+            t[0].distance_squared(t[1])
+                .max(t[1].distance_squared(t[2]))
+                .max(t[2].distance_squared(t[0]))
         };
         self.element_corners.iter().map(square).fold(0.0, f64::max).sqrt()
     }

@@ -53,7 +53,10 @@ impl CameraRays {
             let n = f64::from(self.samples);
             let u = f64::from(x) + (f64::from(i) + 0.5 + offset_x) / n;
             let v = f64::from(y) + (f64::from(j) + 0.5 + offset_y) / n;
-            self.ray((2.0 * u / self.width - 1.0) * self.half.0, (1.0 - 2.0 * v / self.height) * self.half.1)
+            self.ray(
+                (2.0 * u / self.width - 1.0) * self.half.0,
+                (1.0 - 2.0 * v / self.height) * self.half.1,
+            )
         };
         let (origin, direction) = place(0.0, 0.0);
         Ray { origin, direction, right: place(1.0, 0.0), down: place(0.0, 1.0) }

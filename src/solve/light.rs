@@ -53,13 +53,8 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     let occluders = Occluders::build(&triangles);
     let (reflectance, exitance) = mesh::appearance(scene, &mesh);
     let operator = ExactOperator::build(&mesh, &occluders, options.max_memory, monitor)?;
-    let solution = solve(
-        &|u, out| operator.apply(u, out),
-        &reflectance,
-        &exitance,
-        &options.solve,
-        monitor,
-    )?;
+    let solution =
+        solve(&|u, out| operator.apply(u, out), &reflectance, &exitance, &options.solve, monitor)?;
     let sums = operator.row_sums();
     let row_sums = sums.iter().fold((f64::MAX, f64::MIN), |(a, b), &s| (a.min(s), b.max(s)));
     Ok(Light {

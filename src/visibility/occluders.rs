@@ -26,7 +26,8 @@ impl Occluders {
     /// plane that share an edge are joined while the result is convex (Hertel & Mehlhorn 1983):
     /// fewer cuts later, the same set of points.
     pub fn build(triangles: &[[DVec3; 3]]) -> Occluders {
-        let magnitude = triangles.iter().flatten().map(|x| x.abs().max_element()).fold(0.0, f64::max);
+        let magnitude =
+            triangles.iter().flatten().map(|x| x.abs().max_element()).fold(0.0, f64::max);
         let merged = merge(triangles, COINCIDENCE * magnitude);
         let mut occluders = Occluders {
             corners: vec![],
@@ -135,7 +136,8 @@ fn merge(triangles: &[[DVec3; 3]], tolerance: f64) -> Vec<Merged> {
             shared.push((points[a as usize].distance_squared(points[b as usize]), *p, *q, a, b));
         }
     }
-    shared.sort_by(|x, y| y.0.total_cmp(&x.0).then((x.1, x.2, x.3, x.4).cmp(&(y.1, y.2, y.3, y.4))));
+    shared
+        .sort_by(|x, y| y.0.total_cmp(&x.0).then((x.1, x.2, x.3, x.4).cmp(&(y.1, y.2, y.3, y.4))));
 
     let mut owner: Vec<usize> = (0..loops.len()).collect();
     let find = |owner: &[usize], mut i: usize| {
@@ -149,10 +151,11 @@ fn merge(triangles: &[[DVec3; 3]], tolerance: f64) -> Vec<Merged> {
         if p == q {
             continue;
         }
-        let coplanar =
-            loops[q].iter().all(|&x| frames[p].height(points[x as usize]).abs() <= tolerance)
-                && loops[p].iter().all(|&x| frames[q].height(points[x as usize]).abs() <= tolerance)
-                && frames[p].n.dot(frames[q].n) > 0.0;
+        let coplanar = loops[q]
+            .iter()
+            .all(|&x| frames[p].height(points[x as usize]).abs() <= tolerance)
+            && loops[p].iter().all(|&x| frames[q].height(points[x as usize]).abs() <= tolerance)
+            && frames[p].n.dot(frames[q].n) > 0.0;
         if !coplanar {
             continue;
         }

@@ -110,7 +110,8 @@ impl Shadows {
         let tau = observer.occluders.coincidence();
         self.foot = frame.project(point);
         let lifted = |x: DVec2| frame.lift(x);
-        let hull = polygon.iter().fold(Bounds { min: point, max: point }, |b, &x| b.with(lifted(x)));
+        let hull =
+            polygon.iter().fold(Bounds { min: point, max: point }, |b, &x| b.with(lifted(x)));
         let reach = polygon.iter().map(|&x| lifted(x).distance(point)).fold(0.0, f64::max);
         // Planes through the observer and the polygon's edges; the polygon is on the positive side.
         let beam = |i: usize| {
@@ -175,10 +176,11 @@ impl Shadows {
         }
         self.lines.push(line(side * n, on_plane, tau));
         let d = frame.height(point);
-        self.corners.extend(corners.iter().map(|&w| Corner {
-            a: (frame.project(w) - self.foot) * d,
-            b: d - frame.height(w),
-        }));
+        self.corners.extend(
+            corners
+                .iter()
+                .map(|&w| Corner { a: (frame.project(w) - self.foot) * d, b: d - frame.height(w) }),
+        );
         let (end, last) = (self.lines.len(), self.corners.len());
         self.shadows.push(Shadow { begin, end, first, last });
     }

@@ -21,13 +21,7 @@ pub fn material(name: &str, reflectance: f64, radiance: f64) -> Material {
 }
 
 pub fn triangle(vertices: [DVec3; 3], material: u32) -> Triangle {
-    Triangle {
-        vertices,
-        uv: [[DVec2::ZERO; 3]; 2],
-        colour: [DVec3::ONE; 3],
-        material,
-        object: 0,
-    }
+    Triangle { vertices, uv: [[DVec2::ZERO; 3]; 2], colour: [DVec3::ONE; 3], material, object: 0 }
 }
 
 /// A scene of quads (two triangles each), with the index of a material each.
