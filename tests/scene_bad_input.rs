@@ -112,7 +112,9 @@ fn indices_past_the_end() {
     g.json["meshes"][0]["primitives"][0]["indices"] = json!(indices);
     refused_gltf(&g, Invalid, &["mesh 0 \"Tri\", primitive 0, indices", "index 3", "3 vertices"]);
 
-    let past: [(&str, fn(&mut Value), &str); 12] = [
+    /// What is past the end, how it comes about, and where.
+    type Case = (&'static str, fn(&mut Value), &'static str);
+    let past: [Case; 12] = [
         ("default scene", |j| j["scene"] = json!(5), "file"),
         ("node 7", |j| j["scenes"][0]["nodes"] = json!([7]), "scene 0"),
         ("child node 9", |j| j["nodes"][0]["children"] = json!([9]), "node 0 \"Tri\""),
