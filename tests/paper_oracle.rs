@@ -10,8 +10,8 @@ use lumel::monitor::Monitor;
 use lumel::output::csv::Point;
 use lumel::probe::probe;
 use lumel::scene::{ReadOptions, read};
-use lumel::solve::light::{LightOptions, light};
 use lumel::solve::SolveOptions;
+use lumel::solve::light::{LightOptions, light};
 
 struct Errors {
     /// Largest error of points farther than 0.05 from the common edge of S1 and S5, and of nearer
@@ -34,7 +34,8 @@ fn errors(levels: u32) -> Errors {
     let text = std::fs::read_to_string(root.join("tests/data/paper_oracle.json")).unwrap();
     let oracle: serde_json::Value = serde_json::from_str(&text).unwrap();
     let entries = oracle["points"].as_array().unwrap();
-    let vector = |v: &serde_json::Value| DVec3::from_array([0, 1, 2].map(|k| v[k].as_f64().unwrap()));
+    let vector =
+        |v: &serde_json::Value| DVec3::from_array([0, 1, 2].map(|k| v[k].as_f64().unwrap()));
     let points: Vec<Point> = entries
         .iter()
         .map(|p| Point { position: vector(&p["x"]), normal: vector(&p["normal"]) })
@@ -50,7 +51,8 @@ fn errors(levels: u32) -> Errors {
         let x = vector(&entry["x"]);
         let to_edge = (5.0 - x.y).hypot(x.z);
         let faces_the_edge = matches!(entry["piece"].as_str(), Some("S1" | "S5"));
-        let slot = if faces_the_edge && to_edge < 0.05 { &mut errors.near } else { &mut errors.far };
+        let slot =
+            if faces_the_edge && to_edge < 0.05 { &mut errors.near } else { &mut errors.far };
         *slot = slot.max(error / largest);
         errors.pointwise = errors.pointwise.max(error / u);
     }
