@@ -89,9 +89,10 @@ mod tests {
                 }
                 (view.d * sum - view.g(centre + xi)).abs()
             };
-            let rate = (error(0.2) / error(0.1)).log2();
+            // Large enough that the error of order 12 stays above the roundings.
+            let rate = (error(0.4) / error(0.2)).log2();
             // Degree m - 1, so the error falls like h^m (or better, where a term vanishes).
-            assert!(rate > order as f64 - 0.5 && rate < order as f64 + 1.6, "{order}: {rate}");
+            assert!(rate > order as f64 - 0.5 && rate < order as f64 + 2.0, "{order}: {rate}");
         }
     }
 }
