@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 use crate::geometry::Pieces;
 use crate::geometry::polygon::Linear;
 use crate::kernel::{Moments, View, moments_above};
-use crate::mesh::{ALPHA, Basis, Face, Mesh, child};
+use crate::mesh::{ALPHA, Basis, Mesh, child};
 use crate::visibility::{Coverage, Observer, Occluders, Shadows};
 
 /// What was met on the way; the report shows it.
@@ -52,8 +52,7 @@ pub struct Walker {
 }
 
 /// One face as seen from the current point.
-struct Scope<'a> {
-    face: &'a Face,
+struct Scope {
     view: View,
     horizon: Linear,
     basis: Basis,
@@ -90,7 +89,7 @@ impl Walker {
             } else {
                 self.counts.faces_shaded += 1;
             }
-            let scope = Scope { face, view, horizon, basis: mesh.basis };
+            let scope = Scope { view, horizon, basis: mesh.basis };
             for r in face.roots.0..face.roots.1 {
                 let root = &mesh.roots[r as usize];
                 self.descend(&scope, &root.corners, root.level, root.first, 0, &mut entry);
@@ -160,7 +159,7 @@ impl Walker {
 }
 
 /// Turns moments of G V about an element's centroid into integrals of G V times its basis
-/// functions: the collocation integrals of [AC] (2.9), without rho/pi.
+/// functions: the collocation integrals of AC (2.9), without rho/pi.
 pub fn coefficients(m: Moments, element: &[DVec2; 3], basis: Basis) -> [f64; 3] {
     match basis {
         Basis::Constant => [m.zeroth, 0.0, 0.0],
