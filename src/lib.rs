@@ -5,18 +5,22 @@
 //! each other. Light comes from a scene file in this order, and modules import only what stands
 //! before them (a test keeps it):
 //!
-//! [`scene`] -> [`mesh`] -> [`visibility`], [`kernel`] -> [`operator`] -> [`solve`] ->
-//! [`reconstruct`] -> [`render`] | [`probe`] -> [`output`]
+//! [`scene`] -> [`mesh`] -> [`cluster`] -> [`visibility`] -> [`kernel`] -> [`near`] | [`gray`] | [`far`] ->
+//! [`operator`] -> [`solve`] -> [`reconstruct`] -> [`output`] -> [`render`] | [`probe`]
 //!
 //! "AC" in the documentation is K. Atkinson and D. Chien, "A study of the fast solution of the
 //! occluded radiosity equation" (2006), by its sections and equation numbers.
 #![forbid(unsafe_code)]
 
+pub mod cluster;
 pub mod error;
+pub mod far;
 pub mod geometry;
+pub mod gray;
 pub mod kernel;
 pub mod mesh;
 pub mod monitor;
+pub mod near;
 pub mod operator;
 pub mod output;
 pub mod probe;

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{box_room, mesh_of, occluders_of, rotated, scene_of};
+use common::{Prepared, box_room, exact_of, rotated, scene_of};
 use glam::{DMat3, DVec3};
 use lumel::mesh::{Basis, Refinement};
 use lumel::monitor::Monitor;
@@ -10,8 +10,7 @@ use lumel::operator::ExactOperator;
 use lumel::solve::{SolveOptions, solve};
 
 fn operator(scene: &lumel::scene::Scene, basis: Basis, levels: u32) -> ExactOperator {
-    let mesh = mesh_of(scene, basis, Refinement::Levels(levels));
-    ExactOperator::build(&mesh, &occluders_of(scene), u64::MAX, &Monitor::silent()).unwrap()
+    exact_of(&Prepared::new(scene, basis, Refinement::Levels(levels)))
 }
 
 fn worst(sums: &[f64]) -> f64 {
@@ -71,11 +70,9 @@ fn a_furnace_is_uniform() {
 fn scenes_of_one_shape_have_one_solution() {
     let scene = scene_of("plates and a lamp");
     let irradiance = |scene: &lumel::scene::Scene| {
-        let mesh = mesh_of(scene, Basis::Linear, Refinement::Levels(2));
-        let occluders = occluders_of(scene);
-        let operator =
-            ExactOperator::build(&mesh, &occluders, u64::MAX, &Monitor::silent()).unwrap();
-        let (rho, e) = lumel::mesh::appearance(scene, &mesh);
+        let prepared = Prepared::new(scene, Basis::Linear, Refinement::Levels(2));
+        let operator = exact_of(&prepared);
+        let (rho, e) = lumel::mesh::appearance(scene, &prepared.mesh);
         let options = SolveOptions { residual: 1e-13, most_iterations: 500 };
         solve(&|u, out| operator.apply(u, out), &rho, &e, &options, &Monitor::silent())
             .unwrap()

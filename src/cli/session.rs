@@ -88,9 +88,10 @@ impl Session {
             ("faces turned away from a node", counts.faces_away),
             ("faces clear of occluders", counts.faces_clear),
             ("faces with occluders between", counts.faces_shaded),
-            ("elements fully visible", counts.full),
-            ("elements partly visible", counts.partial),
-            ("elements hidden", counts.hidden),
+            ("far clusters", counts.far),
+            ("near elements", counts.near),
+            ("gray elements", counts.gray),
+            ("hidden elements", counts.hidden),
         ] {
             report.count(name, count as usize);
         }

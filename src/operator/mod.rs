@@ -7,4 +7,4 @@ pub mod exact;
 pub mod walk;
 
 pub use exact::{ExactOperator, Forecast};
-pub use walk::{Walker, gather};
+pub use walk::{Stage, Walker, gather};

@@ -3,11 +3,12 @@
 use glam::DVec3;
 
 use super::{Solution, SolveOptions, solve};
+use crate::cluster::Clusters;
 use crate::error::Result;
 use crate::mesh::{self, Mesh, MeshOptions};
 use crate::monitor::Monitor;
 use crate::operator::exact::{ExactOperator, Forecast, forecast};
-use crate::operator::walk::{Counts, Walker, gather};
+use crate::operator::walk::{Counts, Stage, Walker, gather};
 use crate::scene::Scene;
 use crate::visibility::Occluders;
 
@@ -26,6 +27,8 @@ pub struct LightOptions {
 pub struct Light {
     /// The refined surface.
     pub mesh: Mesh,
+    /// Its clusters.
+    pub clusters: Clusters,
     /// What blocks light.
     pub occluders: Occluders,
     /// Reflectance rho at the nodes.
@@ -52,7 +55,9 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     let triangles: Vec<[DVec3; 3]> = scene.triangles.iter().map(|t| t.vertices).collect();
     let occluders = Occluders::build(&triangles);
     let (reflectance, exitance) = mesh::appearance(scene, &mesh);
-    let operator = ExactOperator::build(&mesh, &occluders, options.max_memory, monitor)?;
+    let clusters = Clusters::build(&mesh);
+    let stage = Stage { mesh: &mesh, clusters: &clusters, occluders: &occluders };
+    let operator = ExactOperator::build(stage, options.max_memory, monitor)?;
     let solution =
         solve(&|u, out| operator.apply(u, out), &reflectance, &exitance, &options.solve, monitor)?;
     let sums = operator.row_sums();
@@ -63,6 +68,7 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
         bytes: operator.bytes(),
         counts: operator.counts,
         row_sums,
+        clusters,
         mesh,
         occluders,
         reflectance,
@@ -72,8 +78,13 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
 }
 
 impl Light {
+    /// The surface that points look at.
+    pub fn stage(&self) -> Stage<'_> {
+        Stage { mesh: &self.mesh, clusters: &self.clusters, occluders: &self.occluders }
+    }
+
     /// Irradiance at a point with a unit normal, by gathering the solution with exact visibility.
     pub fn irradiance(&self, walker: &mut Walker, point: DVec3, normal: DVec3) -> DVec3 {
-        gather(walker, &self.mesh, &self.occluders, &self.solution.radiosity, point, normal)
+        gather(walker, self.stage(), &self.solution.radiosity, point, normal)
     }
 }
