@@ -5,8 +5,9 @@
 //! each other. Light comes from a scene file in this order, and modules import only what stands
 //! before them (a test keeps it):
 //!
-//! [`scene`] -> [`mesh`] -> [`cluster`] -> [`visibility`] -> [`kernel`] -> [`near`] | [`gray`] | [`far`] ->
-//! [`operator`] -> [`solve`] -> [`reconstruct`] -> [`output`] -> [`render`] | [`probe`]
+//! [`scene`] -> [`mesh`] -> [`cluster`] -> [`visibility`] -> [`kernel`] ->
+//! [`near`] | [`gray`] | [`far`] -> [`operator`] -> [`solve`] -> [`reconstruct`] -> [`output`] ->
+//! [`render`] | [`probe`]
 //!
 //! "AC" in the documentation is K. Atkinson and D. Chien, "A study of the fast solution of the
 //! occluded radiosity equation" (2006), by its sections and equation numbers.
