@@ -1,6 +1,6 @@
 //! The cluster tree: quadtrees below each root, a spatial tree of faces above them.
 //!
-//! A *cluster* is a triangle of some level of a root's refinement, [AC] section 3: the elements of
+//! A *cluster* is a triangle of some level of a root's refinement, AC section 3: the elements of
 //! the final mesh are the clusters of the deepest level. It lies in one plane. A(tau) and R(tau) are
 //! the centre and radius of its smallest enclosing circle. Clusters of a root are numbered level by
 //! level, so that the children of number k of a level are numbers 4k .. 4k + 3 of the next.
@@ -73,7 +73,7 @@ impl Clusters {
     }
 }
 
-/// Admissibility of [AC] (3.3): R(tau) <= eta |P - A(tau)|.
+/// Admissibility of AC (3.3): R(tau) <= eta |P - A(tau)|.
 ///
 /// `distance_squared` is |P - A(tau)|^2. The comparison leaves a slack of a few roundings: on
 /// regular meshes equality is common, and means admissible.

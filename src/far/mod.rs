@@ -1,6 +1,6 @@
 //! The far field: Taylor polynomials of the kernel, moments of the radiosity.
 //!
-//! [AC] section 3.1. On a cluster tau of one plane, (P - Q).nQ = d is constant and the rest of the
+//! AC section 3.1. On a cluster tau of one plane, (P - Q).nQ = d is constant and the rest of the
 //! kernel, k(x) = (nP.r)/|r|^4, is expanded in the plane about A(tau) to total degree m - 1
 //! ("order m"): two variables suffice. Then
 //!

@@ -1,6 +1,6 @@
 //! The gray field: exact integrals over the visible part of elements that a shadow crosses.
 //!
-//! The visibility line of [AC] section 3 is found exactly, as the boundary of the disjoint convex
+//! The visibility line of AC section 3 is found exactly, as the boundary of the disjoint convex
 //! pieces into which shadows cut the element.
 
 use glam::DVec2;

@@ -19,7 +19,7 @@ pub fn moments(
 }
 
 /// Turns moments of G V about an element's centroid into integrals of G V times its basis
-/// functions: the collocation integrals of [AC] (2.9), without rho/pi.
+/// functions: the collocation integrals of AC (2.9), without rho/pi.
 pub fn coefficients(m: Moments, element: &[DVec2; 3], basis: Basis) -> [f64; 3] {
     match basis {
         Basis::Constant => [m.zeroth, 0.0, 0.0],

@@ -109,7 +109,7 @@ impl Walker {
     /// Calls `seen` with each member of the unique minimal admissible covering of the surface, as
     /// seen from `point` with unit `normal`, that is not hidden, face by face in ascending order.
     ///
-    /// A cluster is far when it is admissible with `eta` ([AC] (3.3)), wholly above the horizon and
+    /// A cluster is far when it is admissible with `eta` (AC (3.3)), wholly above the horizon and
     /// proved fully visible. With eta = 0 nothing is far: the exact row.
     pub fn cover(
         &mut self,

@@ -25,7 +25,7 @@ pub struct Observer<'a> {
 
 impl Observer<'_> {
     /// Whether light between this point and a source plane with normal `n` is negligible however
-    /// they lie: both face the same way but for [`FLAT`].
+    /// they lie: both face the same way but for `FLAT`.
     pub fn faces_away(&self, n: DVec3) -> bool {
         self.normal.distance_squared(n) <= FLAT * FLAT
     }
