@@ -10,6 +10,7 @@ pub mod console;
 pub mod inspect;
 pub mod interrupt;
 pub mod progress;
+pub mod reference_text;
 pub mod session;
 pub mod settings;
 pub mod table;
