@@ -35,9 +35,8 @@ fn inspect(settings: &InspectSettings) -> Result<()> {
 
     let scene = session.read(&settings.scene, &monitor)?;
     let view = view::choose(&scene, &settings.view)?;
-    let description = session
-        .clock
-        .time("describe", || inspect::describe(&scene, &view, settings.solve.max_memory));
+    let forecast = session.forecast(&scene, &settings.solve)?;
+    let description = session.clock.time("describe", || inspect::describe(&scene, &view, forecast));
     progress.clear();
     let text = if settings.json {
         let json = serde_json::to_string_pretty(&description);
