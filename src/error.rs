@@ -45,7 +45,7 @@ pub enum Error {
     #[error("{0}")]
     Runtime(String),
     /// The work needs more memory than it may use.
-    #[error("{what} would need about {} MiB of memory, but only {} MiB may be used: {remedy}", .needed >> 20, .allowed >> 20)]
+    #[error("{what} would need about {} of memory, but only {} may be used: {remedy}", mebibytes(*.needed), mebibytes(*.allowed))]
     Memory {
         /// The stage that needs the memory.
         what: String,
@@ -57,7 +57,9 @@ pub enum Error {
         remedy: String,
     },
     /// An iteration stopped without reaching its tolerance.
-    #[error("the solve did not converge: relative residual {residual:.2e} after {iterations} iterations, asked for {tolerance:.2e}")]
+    #[error(
+        "the solve did not converge: relative residual {residual:.2e} after {iterations} iterations, asked for {tolerance:.2e}"
+    )]
     NotConverged {
         /// Relative residual reached.
         residual: f64,
@@ -73,7 +75,9 @@ pub enum Error {
     #[error("interrupted")]
     Interrupted,
     /// The time limit ran out before there was a result.
-    #[error("the time limit of {0:.1} s ran out before there was a result: raise --time-limit or ask for less")]
+    #[error(
+        "the time limit of {0:.1} s ran out before there was a result: raise --time-limit or ask for less"
+    )]
     TimeLimit(f64),
     /// A file could not be written; what stood there before is unharmed.
     #[error("{}: cannot be written: {reason}", .path.display())]
@@ -83,6 +87,11 @@ pub enum Error {
         /// Why.
         reason: String,
     },
+}
+
+/// Bytes in words.
+fn mebibytes(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
 }
 
 /// Result of everything in this library that can fail.

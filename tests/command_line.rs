@@ -192,6 +192,33 @@ fn inspect_prints_what_was_read() {
 }
 
 #[test]
+fn inspect_forecasts_and_says_what_the_scene_lacks() {
+    let room = room();
+    let inspect = |words: &str| {
+        let output = lumel(room.path(), &format!("inspect room.gltf {words}"));
+        assert_eq!((code(&output), stderr(&output)), (0, String::new()), "{words}");
+        stdout(&output)
+    };
+    let text = inspect("--subdivide 2 --max-memory 1GiB");
+    for part in ["64 elements, 192 nodes", "1 GiB may be used"] {
+        assert!(text.contains(part), "\"{part}\" is not in\n{text}");
+    }
+    assert!(!text.contains("notices"), "{text}");
+    let text = inspect("--subdivide 4 --max-memory 1MB");
+    assert!(text.contains("but only 976.6 KiB") && text.contains("--max-edge"), "{text}");
+    let json: serde_json::Value =
+        serde_json::from_str(&inspect("--subdivide 4 --max-memory 1MB --json")).unwrap();
+    assert_eq!(json["forecast"]["elements"], 1024);
+    assert_eq!(json["forecast"]["fits"], false);
+    let dark = inspect("--emission *=0");
+    assert!(dark.contains("scene: nothing emits light") && dark.contains("floor, lamp"), "{dark}");
+    assert!(inspect("--light-scale 0").contains("--light-scale 0"));
+    assert!(inspect("--reflectance *=0").contains("nothing reflects light"));
+    let clamped = inspect("--reflectance floor=1.5");
+    assert!(clamped.contains("material \"floor\": reflectance (1.5"), "{clamped}");
+}
+
+#[test]
 fn inspect_can_print_json_and_write_a_report() {
     let room = room();
     let words = "inspect room.gltf --json --light-scale 2 --reflectance f*=0.25 --report r.json";

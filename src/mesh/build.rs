@@ -53,13 +53,19 @@ pub fn build(scene: &Scene, options: &MeshOptions) -> Result<Mesh> {
         })
         .collect();
     choose_levels(&mut roots, options.refinement);
-    let bounds = scene
-        .triangles
-        .iter()
-        .fold(Bounds::EMPTY, |b, t| b.union(Bounds::of(&t.vertices)));
+    let bounds =
+        scene.triangles.iter().fold(Bounds::EMPTY, |b, t| b.union(Bounds::of(&t.vertices)));
     let magnitude = bounds.min.abs().max(bounds.max.abs()).max_element();
     let (element_root, element_corners) = elements(&mut roots)?;
-    Ok(Mesh { basis: options.basis, faces, roots, element_root, element_corners, bounds, magnitude })
+    Ok(Mesh {
+        basis: options.basis,
+        faces,
+        roots,
+        element_root,
+        element_corners,
+        bounds,
+        magnitude,
+    })
 }
 
 fn longest_edge(t: &[DVec2; 3]) -> f64 {
@@ -97,8 +103,7 @@ fn elements(roots: &mut [Root]) -> Result<(Vec<u32>, Vec<[DVec2; 3]>)> {
         element_corners.push(root.corners);
         for _ in 0..root.level {
             let parents = element_corners.split_off(begin);
-            element_corners
-                .extend(parents.iter().flat_map(|t| (0..4).map(move |k| child(t, k))));
+            element_corners.extend(parents.iter().flat_map(|t| (0..4).map(move |k| child(t, k))));
         }
         element_root.resize(element_corners.len(), index as u32);
     }

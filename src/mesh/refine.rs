@@ -40,9 +40,8 @@ pub fn level_for(longest: f64, max_edge: f64) -> u32 {
 /// Longest allowed edge that gives at most `target` elements over roots with these longest edges
 /// (or no refinement at all, when there are more roots than that).
 pub(super) fn edge_for_count(longest: &[f64], target: usize) -> f64 {
-    let count = |edge: f64| {
-        longest.iter().map(|&l| 4f64.powi(level_for(l, edge) as i32)).sum::<f64>()
-    };
+    let count =
+        |edge: f64| longest.iter().map(|&l| 4f64.powi(level_for(l, edge) as i32)).sum::<f64>();
     let top = longest.iter().copied().fold(0.0, f64::max);
     let (mut fine, mut coarse) = (top * 2f64.powi(-(DEEPEST as i32)), top);
     if count(fine) <= target as f64 {

@@ -144,9 +144,8 @@ mod tests {
                 out[i] = x[i] - 0.3 * (x[(i + 1) % n] + x[(i + 7) % n] + 0.6 * x[(i * 13) % n]);
             }
         };
-        let b: Vec<DVec3> = (0..n)
-            .map(|i| DVec3::new((i as f64).sin(), 0.0, 1e-30 * (1.0 + i as f64)))
-            .collect();
+        let b: Vec<DVec3> =
+            (0..n).map(|i| DVec3::new((i as f64).sin(), 0.0, 1e-30 * (1.0 + i as f64))).collect();
         let options = SolveOptions { residual: 1e-12, most_iterations: 500 };
         let (x, residual, products) = gmres(&apply, &b, &options, &Monitor::silent()).unwrap();
         assert!(residual.max_element() <= 1e-12, "{residual} after {products}");

@@ -1,6 +1,7 @@
 //! Solving (I - K) u = E: restarted GMRES, three colours in one product.
 
 mod gmres;
+pub mod light;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -9,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 
 pub use gmres::gmres;
+pub use light::{Light, LightOptions};
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +58,9 @@ pub fn solve(
         });
     };
     let (radiosity, residual, iterations) = gmres(&reflect, exitance, options, monitor)?;
-    if !(residual.max_element() <= options.residual) {
+    // What is not a number has not converged either.
+    let converged = residual.max_element() <= options.residual;
+    if !converged {
         return Err(Error::NotConverged {
             residual: residual.max_element(),
             iterations,

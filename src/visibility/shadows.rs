@@ -31,7 +31,7 @@ pub struct Observer<'a> {
 
 impl Observer<'_> {
     /// Whether light between this point and a source plane with normal `n` is negligible however
-    /// they lie: both face the same way but for [`FLAT`].
+    /// they lie: both face the same way but for `FLAT`.
     pub fn faces_away(&self, n: DVec3) -> bool {
         self.normal.distance_squared(n) <= FLAT * FLAT
     }
@@ -116,7 +116,8 @@ impl Shadows {
         let tau = observer.occluders.coincidence();
         self.foot = frame.project(point);
         let lifted = |x: DVec2| frame.lift(x);
-        let hull = polygon.iter().fold(Bounds { min: point, max: point }, |b, &x| b.with(lifted(x)));
+        let hull =
+            polygon.iter().fold(Bounds { min: point, max: point }, |b, &x| b.with(lifted(x)));
         let reach = polygon.iter().map(|&x| lifted(x).distance(point)).fold(0.0, f64::max);
         // Planes through the observer and the polygon's edges; the polygon is on the positive side.
         let beam = |i: usize| {
@@ -185,10 +186,11 @@ impl Shadows {
         }
         self.lines.push(line(side * n, on_plane, tau));
         let d = frame.height(point);
-        self.corners.extend(corners.iter().map(|&w| Corner {
-            a: (frame.project(w) - self.foot) * d,
-            b: d - frame.height(w),
-        }));
+        self.corners.extend(
+            corners
+                .iter()
+                .map(|&w| Corner { a: (frame.project(w) - self.foot) * d, b: d - frame.height(w) }),
+        );
         let (end, last) = (self.lines.len(), self.corners.len());
         self.shadows.push(Shadow { begin, end, first, last });
     }
