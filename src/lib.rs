@@ -26,6 +26,7 @@ pub mod operator;
 pub mod output;
 pub mod probe;
 pub mod reconstruct;
+pub mod reference;
 pub mod render;
 pub mod scene;
 pub mod solve;

@@ -7,6 +7,7 @@ use std::path::Path;
 use glam::DVec3;
 use lumel::mesh::{Basis, MeshOptions, Refinement};
 use lumel::monitor::Monitor;
+use lumel::operator::OperatorKind;
 use lumel::output::csv::Point;
 use lumel::probe::probe;
 use lumel::scene::{ReadOptions, read};
@@ -27,6 +28,7 @@ fn errors(levels: u32) -> Errors {
     let scene = read(&root.join("scenes/paper.gltf"), &ReadOptions::default()).unwrap();
     let options = LightOptions {
         mesh: MeshOptions { basis: Basis::Linear, refinement: Refinement::Levels(levels) },
+        operator: OperatorKind::Exact,
         solve: SolveOptions { residual: 1e-12, ..SolveOptions::default() },
         max_memory: u64::MAX,
     };

@@ -12,6 +12,7 @@ pub mod forecast;
 pub mod inspect;
 pub mod interrupt;
 pub mod progress;
+pub mod reference_text;
 pub mod session;
 pub mod settings;
 pub mod table;

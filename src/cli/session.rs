@@ -110,7 +110,7 @@ impl Session {
             report.count(name, count as usize);
         }
         report.value("operator bytes", light.bytes as f64);
-        report.value("operator bytes forecast", light.forecast.bytes as f64);
+        report.value("operator bytes forecast", light.forecast as f64);
         report.value("smallest row sum", light.row_sums.0);
         report.value("largest row sum", light.row_sums.1);
         report.channels("residual", light.solution.residual.to_array());

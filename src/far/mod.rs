@@ -12,7 +12,7 @@ pub mod moments;
 pub mod taylor;
 
 pub use moments::ClusterMoments;
-pub use taylor::{count, expand};
+pub use taylor::{count, expand, far_sum};
 
 /// Highest order m that is offered.
 pub const MOST_ORDER: usize = 16;

@@ -20,6 +20,12 @@ pub const fn count(order: usize) -> usize {
 ///
 /// and the numerator a.r0 - c d + a.xi multiplies that: O(m^2) work in all.
 pub fn expand(view: &View, centre: DVec2, order: usize, out: &mut [f64]) {
+    expand_inline(view, centre, order, out);
+}
+
+/// [`expand`], to be compiled anew for each constant order.
+#[inline(always)]
+fn expand_inline(view: &View, centre: DVec2, order: usize, out: &mut [f64]) {
     let r0 = centre - view.foot;
     let s0 = r0.length_squared() + view.d * view.d;
     let inverse = 1.0 / s0;
@@ -62,6 +68,54 @@ pub fn expand(view: &View, centre: DVec2, order: usize, out: &mut [f64]) {
     }
 }
 
+/// Adds d sum kappa_ij M_ij to `sum`: the far field of one cluster, for C channels.
+pub fn far_sum<const C: usize>(
+    order: usize,
+    view: &View,
+    centre: DVec2,
+    moments: &[[f64; C]],
+    sum: &mut [f64; C],
+) {
+    match order {
+        1 => fixed::<1, C>(view, centre, moments, sum),
+        2 => fixed::<2, C>(view, centre, moments, sum),
+        3 => fixed::<3, C>(view, centre, moments, sum),
+        4 => fixed::<4, C>(view, centre, moments, sum),
+        5 => fixed::<5, C>(view, centre, moments, sum),
+        6 => fixed::<6, C>(view, centre, moments, sum),
+        _ => {
+            let mut kappa = [0.0; count(MOST_ORDER)];
+            expand(view, centre, order, &mut kappa);
+            add(view.d, &kappa[..count(order)], moments, sum);
+        }
+    }
+}
+
+/// [`far_sum`] with a constant order: loops of known length unroll.
+fn fixed<const M: usize, const C: usize>(
+    view: &View,
+    centre: DVec2,
+    moments: &[[f64; C]],
+    sum: &mut [f64; C],
+) {
+    let mut kappa = [0.0; count(6)];
+    expand_inline(view, centre, M, &mut kappa);
+    add(view.d, &kappa[..count(M)], moments, sum);
+}
+
+#[inline(always)]
+fn add<const C: usize>(d: f64, kappa: &[f64], moments: &[[f64; C]], sum: &mut [f64; C]) {
+    let mut total = [0.0; C];
+    for (k, m) in kappa.iter().zip(moments) {
+        for (t, m) in total.iter_mut().zip(m) {
+            *t += k * m;
+        }
+    }
+    for (s, t) in sum.iter_mut().zip(total) {
+        *s += d * t;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,9 +143,10 @@ mod tests {
                 }
                 (view.d * sum - view.g(centre + xi)).abs()
             };
-            let rate = (error(0.2) / error(0.1)).log2();
+            // Large enough that the error of order 12 stays above the roundings.
+            let rate = (error(0.4) / error(0.2)).log2();
             // Degree m - 1, so the error falls like h^m (or better, where a term vanishes).
-            assert!(rate > order as f64 - 0.5 && rate < order as f64 + 1.6, "{order}: {rate}");
+            assert!(rate > order as f64 - 0.5 && rate < order as f64 + 2.0, "{order}: {rate}");
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::geometry::{Bounds, Frame};
 
 pub use appearance::{appearance, face_weights};
 pub use build::{MeshOptions, build};
-pub use refine::{Refinement, child, level_for};
+pub use refine::{DEEPEST, Refinement, child, level_for};
 
 /// Position of the interior nodes of linear elements, AC (2.5); 0 < alpha < 1/3.
 pub const ALPHA: f64 = 1.0 / 6.0;

@@ -137,14 +137,6 @@ impl ExactOperator {
             }
         });
     }
-
-    /// Sums of the rows over pi: the share of the hemisphere that is filled by radiating surfaces,
-    /// 1 in a closed scene.
-    pub fn row_sums(&self) -> Vec<f64> {
-        let mut out = vec![DVec3::ZERO; self.nodes];
-        self.apply(&vec![DVec3::ONE; self.nodes], &mut out);
-        out.iter().map(|h| h.x / std::f64::consts::PI).collect()
-    }
 }
 
 fn chunk(

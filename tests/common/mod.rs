@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 use lumel::cluster::Clusters;
 use lumel::mesh::{Basis, Mesh, MeshOptions, Refinement};
 use lumel::monitor::Monitor;
-use lumel::operator::{ExactOperator, Stage};
+use lumel::operator::{Operator, OperatorKind, Stage};
 use lumel::scene::{Material, Object, Scene, Triangle};
 use lumel::visibility::Occluders;
 
@@ -124,6 +124,6 @@ impl Prepared {
 }
 
 /// The exact operator of a prepared scene.
-pub fn exact_of(prepared: &Prepared) -> ExactOperator {
-    ExactOperator::build(prepared.stage(), u64::MAX, &Monitor::silent()).unwrap()
+pub fn exact_of(prepared: &Prepared) -> Operator<'_> {
+    Operator::build(prepared.stage(), OperatorKind::Exact, u64::MAX, &Monitor::silent()).unwrap()
 }
