@@ -1,9 +1,8 @@
 //! The program as a user runs it: what is wrong is said, with the right exit code.
 
-use std::path::Path;
-use std::process::Output;
+mod command_support;
 
-use assert_cmd::Command;
+use command_support::*;
 use tempfile::TempDir;
 
 /// A floor of 4 square metres and, 2 m above it, a lamp that shines down; one camera.
@@ -51,39 +50,6 @@ fn room() -> TempDir {
     std::fs::write(room.path().join("floor.bin"), floor).unwrap();
     std::fs::write(room.path().join("points.csv"), "x,y,z,nx,ny,nz\n0,0,0,0,1,0\n").unwrap();
     room
-}
-
-/// Runs the program in `directory` with words separated by spaces.
-fn lumel(directory: &Path, words: &str) -> Output {
-    Command::cargo_bin("lumel")
-        .unwrap()
-        .current_dir(directory)
-        .args(words.split_whitespace())
-        .output()
-        .unwrap()
-}
-
-fn code(output: &Output) -> i32 {
-    output.status.code().unwrap()
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-/// Runs the program and demands an exit code and parts of the message.
-fn fails(directory: &Path, words: &str, wanted: i32, parts: &[&str]) {
-    let output = lumel(directory, words);
-    let message = stderr(&output);
-    assert_eq!(code(&output), wanted, "{words}: {message}");
-    assert_eq!(stdout(&output), "", "{words}: a failure prints no result");
-    for part in parts {
-        assert!(message.contains(part), "{words}: \"{part}\" is not in\n{message}");
-    }
 }
 
 #[test]

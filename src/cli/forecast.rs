@@ -1,8 +1,10 @@
 //! What solving a scene would take, found without solving it.
 
 use lumel::Result;
+use lumel::cluster::Clusters;
 use lumel::mesh;
-use lumel::operator::exact;
+use lumel::operator::clustered::{self, Kept};
+use lumel::operator::{Operator, OperatorKind, Stage};
 use lumel::scene::Scene;
 use lumel::visibility::Occluders;
 use serde::Serialize;
@@ -17,7 +19,7 @@ pub struct Forecast {
     pub elements: usize,
     /// Collocation nodes: unknowns of each channel.
     pub nodes: usize,
-    /// Bytes of the operator, an upper estimate.
+    /// Bytes of the operator, from samples; of the exact one an upper estimate.
     pub operator_bytes: u64,
     /// Bytes that may be used.
     pub max_memory: Option<u64>,
@@ -30,19 +32,28 @@ impl Forecast {
     pub fn new(scene: &Scene, settings: &SolveSettings) -> Result<Forecast> {
         let mesh = mesh::build(scene, &settings.light_options().mesh)?;
         let triangles: Vec<_> = scene.triangles.iter().map(|t| t.vertices).collect();
-        let operator = exact::forecast(&mesh, &Occluders::build(&triangles));
+        let occluders = Occluders::build(&triangles);
+        let clusters = Clusters::build(&mesh);
+        let stage = Stage { mesh: &mesh, clusters: &clusters, occluders: &occluders };
+        let fits = |bytes| settings.max_memory.is_none_or(|allowed| bytes <= allowed);
+        let mut operator_bytes = Operator::forecast(stage, settings.operator);
+        if let OperatorKind::Clustered(options) = settings.operator
+            && !fits(operator_bytes)
+        {
+            operator_bytes = clustered::forecast(stage, options.eta).bytes(Kept::Exact);
+        }
         Ok(Forecast {
             elements: mesh.elements(),
             nodes: mesh.nodes(),
-            operator_bytes: operator.bytes,
+            operator_bytes,
             max_memory: settings.max_memory,
-            fits: settings.max_memory.is_none_or(|allowed| operator.bytes <= allowed),
+            fits: fits(operator_bytes),
         })
     }
 
     /// The memory in words.
     pub fn memory_text(&self) -> String {
-        let needed = format!("{} at most", bytes(self.operator_bytes));
+        let needed = format!("about {}", bytes(self.operator_bytes));
         match self.max_memory {
             None => needed,
             Some(allowed) if self.fits => format!("{needed}; {} may be used", bytes(allowed)),
@@ -68,8 +79,8 @@ mod tests {
             max_memory,
             fits,
         };
-        assert_eq!(forecast(None, true).memory_text(), "3 MiB at most");
-        assert_eq!(forecast(Some(4 << 20), true).memory_text(), "3 MiB at most; 4 MiB may be used");
+        assert_eq!(forecast(None, true).memory_text(), "about 3 MiB");
+        assert_eq!(forecast(Some(4 << 20), true).memory_text(), "about 3 MiB; 4 MiB may be used");
         let text = forecast(Some(2 << 20), false).memory_text();
         assert!(text.contains("only 2 MiB") && text.contains("--max-edge"), "{text}");
     }

@@ -374,7 +374,7 @@ mod tests {
             "  scene     rooms/s.gltf\n",
             "  faces     3 (4 sides that radiate)\n",
             "  mesh      8 elements, 24 nodes\n",
-            "  operator  1 MiB at most; 3 GiB may be used\n",
+            "  operator  about 1 MiB; 3 GiB may be used\n",
             "\nmaterials (3)\n",
             "  floor       2         2      1  0.5 0.25 0.125\n",
             "\nemitters (1)\n",

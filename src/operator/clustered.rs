@@ -1,4 +1,4 @@
-//! The clustered operator of Hackbusch & Nowak (1989) for the occluded radiosity equation, [AC]
+//! The clustered operator of Hackbusch & Nowak (1989) for the occluded radiosity equation, AC
 //! section 3: exact integrals over the near and the gray field, Taylor polynomials of the kernel
 //! over the far field.
 //!
@@ -57,7 +57,7 @@ impl ClusteredOptions {
 /// Sizes of the three fields, over all nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FieldSizes {
-    /// Largest number of gray elements of a node: sigma_G of [AC] section 6.
+    /// Largest number of gray elements of a node: sigma_G of AC section 6.
     pub gray: u64,
     /// Largest number of near elements: sigma_N.
     pub near: u64,

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::walk::{Counts, Stage, Walker};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::monitor::Monitor;
+use crate::monitor::{self, Monitor};
 use crate::visibility::Occluders;
 
 /// Rows that one task builds: enough to share its memory, few enough to share out evenly.
@@ -97,8 +97,7 @@ impl ExactOperator {
             .par_iter()
             .map_init(Walker::default, |walker, &start| {
                 let rows = start..(start + ROWS_PER_TASK).min(nodes);
-                progress.advance(rows.len() as u64)?;
-                Ok(chunk(walker, stage, rows))
+                chunk(walker, stage, rows, &progress)
             })
             .collect::<Result<_>>()?;
         let mut counts = Counts::default();
@@ -140,11 +139,17 @@ impl ExactOperator {
     }
 }
 
-fn chunk(walker: &mut Walker, stage: Stage, rows: std::ops::Range<usize>) -> Chunk {
+fn chunk(
+    walker: &mut Walker,
+    stage: Stage,
+    rows: std::ops::Range<usize>,
+    progress: &monitor::Stage,
+) -> Result<Chunk> {
     walker.counts = Counts::default();
     let n = stage.mesh.basis.nodes();
     let (mut ends, mut elements, mut coefficients) = (vec![], vec![], vec![]);
     for node in rows {
+        progress.advance(1)?;
         let (point, normal) = stage.mesh.node(node);
         walker.row(stage, point, normal, |element, c| {
             elements.push(element);
@@ -154,5 +159,5 @@ fn chunk(walker: &mut Walker, stage: Stage, rows: std::ops::Range<usize>) -> Chu
     }
     elements.shrink_to_fit();
     coefficients.shrink_to_fit();
-    Chunk { ends, elements, coefficients, counts: walker.counts }
+    Ok(Chunk { ends, elements, coefficients, counts: walker.counts })
 }

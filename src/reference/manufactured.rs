@@ -1,4 +1,4 @@
-//! Known solutions, and the emissivity that makes them solutions: [AC] (6.8), (5.2) and (6.7).
+//! Known solutions, and the emissivity that makes them solutions: AC (6.8), (5.2) and (6.7).
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! The paper's experiments: [AC] sections 5 and 6, Tables 6.1 to 6.11.
+//! The paper's experiments: AC sections 5 and 6, Tables 6.1 to 6.11.
 //!
 //! | file | subject |
 //! |---|---|

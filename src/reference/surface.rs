@@ -1,4 +1,4 @@
-//! The 5-piece surface of [AC] section 5.
+//! The 5-piece surface of AC section 5.
 
 use glam::{DVec2, DVec3};
 
@@ -19,8 +19,8 @@ pub const C: f64 = 1.0;
 /// Number of a piece: S1 is 0.
 pub type Piece = usize;
 
-/// S1 = [0,A]^2 in z = 0 facing up, S2 and S3 the bottom and the top of [0,B]^2 in z = 1,
-/// S4 = [0,C]^2 in z = 2 facing down, S5 = {y = A, 0 <= x <= A, 0 <= z <= 1} facing S1.
+/// S1 = `[0,A]^2` in z = 0 facing up, S2 and S3 the bottom and the top of `[0,B]^2` in z = 1,
+/// S4 = `[0,C]^2` in z = 2 facing down, S5 = {y = A, 0 <= x <= A, 0 <= z <= 1} facing S1.
 ///
 /// Two triangles each: S1 to S4 along (0,0)-(max,max), S5 along (A,A,0)-(0,A,1).
 pub fn scene() -> Scene {
