@@ -76,6 +76,10 @@ fn growth(rows: &[Row]) -> String {
             .filter(|r| r.n == largest)
             .filter_map(|r| Some((r.eta?, r.computed)))
             .collect();
+        // Small surfaces are all near field: nothing grows there.
+        if largest < 2560 {
+            continue;
+        }
         if let Some(p) = exponent(&by_eta) {
             text.push_str(&format!(
                 "(6.12) order {order}, n = {largest}: T ~ eta^-{:.2} (the paper: 1.88)\n",

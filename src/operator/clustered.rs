@@ -303,6 +303,45 @@ impl<'a> ClusteredOperator<'a> {
     }
 }
 
+/// A solution ready for gathering with the clustering of an operator.
+pub struct ClusteredSource {
+    options: ClusteredOptions,
+    moments: ClusterMoments<3>,
+    values: Vec<[f64; 3]>,
+}
+
+impl ClusteredSource {
+    /// Computes the moments of the piecewise polynomial with node values `values`.
+    pub fn new(stage: Stage, options: ClusteredOptions, values: &[DVec3]) -> ClusteredSource {
+        let values: Vec<[f64; 3]> = values.iter().map(|u| u.to_array()).collect();
+        let mut moments = ClusterMoments::new(stage.clusters, options.order);
+        moments.compute(stage.mesh, stage.clusters, &values);
+        ClusteredSource { options, moments, values }
+    }
+
+    /// Irradiance H = 1/pi int u G V at a point with the given unit normal: exact from near and
+    /// gray elements, by Taylor polynomials from far clusters.
+    pub fn gather(&self, walker: &mut Walker, stage: Stage, point: DVec3, normal: DVec3) -> DVec3 {
+        let (basis, order) = (stage.mesh.basis, self.options.order);
+        let mut clip = Pieces::default();
+        let mut sum = [0.0; 3];
+        walker.cover(stage, point, normal, self.options.eta, |scope, seen| {
+            if let Seen::Far(cluster) = seen {
+                let centre = stage.clusters.centre[cluster as usize];
+                far_sum(order, &scope.view, centre, self.moments.of(cluster), &mut sum);
+            } else if let Some((element, c)) = exact_entry(scope, seen, basis, &mut clip) {
+                let values = &self.values[element as usize * basis.nodes()..];
+                for (c, value) in c.iter().zip(&values[..basis.nodes()]) {
+                    for (s, v) in sum.iter_mut().zip(value) {
+                        *s += c * v;
+                    }
+                }
+            }
+        });
+        DVec3::from_array(sum) / std::f64::consts::PI
+    }
+}
+
 fn chunk(
     walker: &mut Walker,
     clip: &mut Pieces,

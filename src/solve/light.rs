@@ -7,6 +7,7 @@ use crate::cluster::Clusters;
 use crate::error::Result;
 use crate::mesh::{self, Mesh, MeshOptions};
 use crate::monitor::Monitor;
+use crate::operator::clustered::ClusteredSource;
 use crate::operator::walk::{Counts, Stage, Walker, gather};
 use crate::operator::{Operator, OperatorKind};
 use crate::scene::Scene;
@@ -39,6 +40,8 @@ pub struct Light {
     pub exitance: Vec<DVec3>,
     /// Radiosity and irradiance at the nodes.
     pub solution: Solution,
+    /// The radiosity made ready for clustered gathering, where the operator was clustered.
+    pub clustered: Option<ClusteredSource>,
     /// Bytes that were forecast for the operator before it was built.
     pub forecast: u64,
     /// Pairs of a node and an element that the operator stores.
@@ -64,7 +67,14 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
         solve(&|u, out| operator.apply(u, out), &reflectance, &exitance, &options.solve, monitor)?;
     let sums = operator.row_sums(mesh.nodes());
     let row_sums = sums.iter().fold((f64::MAX, f64::MIN), |(a, b), &s| (a.min(s), b.max(s)));
+    let clustered = match options.operator {
+        OperatorKind::Exact => None,
+        OperatorKind::Clustered(clustering) => {
+            Some(ClusteredSource::new(stage, clustering, &solution.radiosity))
+        }
+    };
     Ok(Light {
+        clustered,
         forecast: Operator::forecast(stage, options.operator),
         entries: operator.entries(),
         bytes: operator.bytes(),
@@ -85,8 +95,12 @@ impl Light {
         Stage { mesh: &self.mesh, clusters: &self.clusters, occluders: &self.occluders }
     }
 
-    /// Irradiance at a point with a unit normal, by gathering the solution with exact visibility.
+    /// Irradiance at a point with a unit normal, by gathering the solution with exact visibility,
+    /// and with the clustering of the operator where it was clustered.
     pub fn irradiance(&self, walker: &mut Walker, point: DVec3, normal: DVec3) -> DVec3 {
-        gather(walker, self.stage(), &self.solution.radiosity, point, normal)
+        match &self.clustered {
+            Some(source) => source.gather(walker, self.stage(), point, normal),
+            None => gather(walker, self.stage(), &self.solution.radiosity, point, normal),
+        }
     }
 }
