@@ -81,6 +81,7 @@ impl Session {
         let contacts = light.mesh.contacts;
         report.count("faces cut at contacts", contacts.cut);
         report.count("segments of contacts", contacts.segments);
+        report.count("faces cut at longer contacts only", contacts.simplified);
         report.count("faces with contacts left whole", contacts.left_whole);
         report.count("roots", light.mesh.roots.len());
         report.count("elements", light.mesh.elements());

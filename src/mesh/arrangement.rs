@@ -11,9 +11,9 @@
 
 use glam::DVec2;
 
-/// Most points of one triangle. Pieces are about as many; a face with more of them costs more than
-/// its contacts are worth, and is left whole.
-pub(super) const MOST_POINTS: usize = 200;
+/// Most points of one triangle, and so at most twice as many pieces: a point is looked for in all
+/// pieces of a face, and each costs at least one element.
+pub(super) const MOST_POINTS: usize = 128;
 
 /// Rounds of snapping. Two or three settle what scenes hold; what does not settle is given up.
 const ROUNDS: usize = 16;

@@ -24,7 +24,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::Face;
-use super::arrangement::{MOST_POINTS, arrange};
+use super::arrangement::arrange;
 use super::pieces::{Cut, cut_along};
 use super::seams::Joins;
 use crate::geometry::{Bounds, BoxTree, Frame};
@@ -50,6 +50,17 @@ const THIN: f64 = 8.0;
 /// that a flat neighbour continues: ten times what still counts as flat ([`super::seams`]).
 const PARALLEL: f64 = 1e-4;
 
+/// Triangles longer than this share of the scene are cut into well-shaped pieces: they will be
+/// refined and seen. Small ones become few elements whatever their shape.
+const LARGE: f64 = 1.0 / 8.0;
+
+/// Most segments of one triangle that are tried: far more than may be left once they are snapped.
+const MOST_SEGMENTS: usize = 1000;
+
+/// Where a triangle has too many contacts, those shorter than this share of it are left out: the
+/// first share with which it can be cut. They are the feet of small and round things.
+const LEAST_LENGTHS: [f64; 6] = [0.0, 1.0 / 256.0, 1.0 / 128.0, 1.0 / 64.0, 1.0 / 32.0, 1.0 / 16.0];
+
 /// What the cutting did; the report shows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Contacts {
@@ -57,7 +68,9 @@ pub struct Contacts {
     pub cut: usize,
     /// Segments that they were cut along, or severed from a neighbour.
     pub segments: usize,
-    /// Triangles left whole although others touch them: too many pieces, or no triangulation.
+    /// Triangles among them that too many others touch: cut along the longer contacts only.
+    pub simplified: usize,
+    /// Triangles left whole although others touch them: no triangulation was found.
     pub left_whole: usize,
 }
 
@@ -73,13 +86,15 @@ pub(super) fn find(
     let boxes: Vec<Bounds> = scene.triangles.iter().map(|t| Bounds::of(&t.vertices)).collect();
     let tolerance = tolerance(&boxes);
     let tree = BoxTree::build(&boxes);
-    let finder = Finder { scene, faces, front, joins, boxes, tree, tolerance };
+    let extent = boxes.iter().fold(Bounds::EMPTY, |a, &b| a.union(b)).extent();
+    let finder = Finder { scene, faces, front, joins, boxes, tree, tolerance, extent };
     let found: Vec<(Option<Cut>, Contacts)> =
         (0..scene.triangles.len()).into_par_iter().map(|i| finder.cut(i)).collect();
     let mut sum = Contacts::default();
     let cuts = found.into_iter().map(|(cut, c)| {
         sum.cut += c.cut;
         sum.segments += c.segments;
+        sum.simplified += c.simplified;
         sum.left_whole += c.left_whole;
         cut
     });
@@ -101,6 +116,7 @@ struct Finder<'a> {
     boxes: Vec<Bounds>,
     tree: BoxTree,
     tolerance: f64,
+    extent: f64,
 }
 
 impl Finder<'_> {
@@ -111,10 +127,19 @@ impl Finder<'_> {
             return (None, counts);
         };
         let corners = &self.faces[face as usize].corners;
-        let cut = (segments.len() <= 2 * MOST_POINTS)
-            .then(|| arrange(corners, &segments, self.tolerance))
-            .flatten()
-            .and_then(|arrangement| cut_along(&arrangement, self.tolerance));
+        let shapely = self.boxes[triangle].extent() > LARGE * self.extent;
+        let cut = LEAST_LENGTHS.iter().find_map(|share| {
+            let least = share * self.boxes[triangle].extent();
+            let long = |s: &&[DVec2; 2]| s[0].distance(s[1]) >= least;
+            let segments: Vec<[DVec2; 2]> = segments.iter().filter(long).copied().collect();
+            if segments.is_empty() || segments.len() > MOST_SEGMENTS {
+                return None;
+            }
+            let arrangement = arrange(corners, &segments, self.tolerance)?;
+            let cut = cut_along(&arrangement, self.tolerance, shapely)?;
+            counts.simplified = usize::from(*share > 0.0);
+            Some(cut)
+        });
         match &cut {
             Some(cut) => {
                 counts.segments = cut.contacts.len();
