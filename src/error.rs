@@ -45,7 +45,7 @@ pub enum Error {
     #[error("{0}")]
     Runtime(String),
     /// The work needs more memory than it may use.
-    #[error("{what} would need about {} MiB of memory, but only {} MiB may be used: {remedy}", .needed >> 20, .allowed >> 20)]
+    #[error("{what} would need about {} of memory, but only {} may be used: {remedy}", mebibytes(*.needed), mebibytes(*.allowed))]
     Memory {
         /// The stage that needs the memory.
         what: String,
@@ -87,6 +87,11 @@ pub enum Error {
         /// Why.
         reason: String,
     },
+}
+
+/// Bytes in words.
+fn mebibytes(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
 }
 
 /// Result of everything in this library that can fail.

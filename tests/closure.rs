@@ -2,16 +2,15 @@
 
 mod common;
 
-use common::{box_room, mesh_of, occluders_of, rotated, scene_of};
+use common::{Prepared, box_room, exact_of, rotated, scene_of};
 use glam::{DMat3, DVec3};
 use lumel::mesh::{Basis, Refinement};
 use lumel::monitor::Monitor;
-use lumel::operator::ExactOperator;
 use lumel::solve::{SolveOptions, solve};
 
-fn operator(scene: &lumel::scene::Scene, basis: Basis, levels: u32) -> ExactOperator {
-    let mesh = mesh_of(scene, basis, Refinement::Levels(levels));
-    ExactOperator::build(&mesh, &occluders_of(scene), u64::MAX, &Monitor::silent()).unwrap()
+fn row_sums(scene: &lumel::scene::Scene, basis: Basis, levels: u32) -> Vec<f64> {
+    let prepared = Prepared::new(scene, basis, Refinement::Levels(levels));
+    exact_of(&prepared).row_sums(prepared.mesh.nodes())
 }
 
 fn worst(sums: &[f64]) -> f64 {
@@ -21,7 +20,7 @@ fn worst(sums: &[f64]) -> f64 {
 #[test]
 fn an_empty_box_is_closed() {
     for basis in [Basis::Constant, Basis::Linear] {
-        let sums = operator(&box_room(&[]), basis, 2).row_sums();
+        let sums = row_sums(&box_room(&[]), basis, 2);
         assert!(worst(&sums) < 1e-13, "{:e}", worst(&sums));
     }
 }
@@ -33,7 +32,7 @@ fn a_box_with_blocks_inside_is_closed() {
         (DVec3::new(0.6, 0.25, 0.1), DVec3::new(0.8, 0.5, 0.3)),
     ];
     for basis in [Basis::Constant, Basis::Linear] {
-        let sums = operator(&box_room(&blocks), basis, 2).row_sums();
+        let sums = row_sums(&box_room(&blocks), basis, 2);
         assert!(worst(&sums) < 1e-12, "{:e}", worst(&sums));
         let turned = rotated(
             &box_room(&blocks),
@@ -41,7 +40,7 @@ fn a_box_with_blocks_inside_is_closed() {
             1e3,
             DVec3::new(10.0, -4e3, 3.0),
         );
-        let sums = operator(&turned, basis, 1).row_sums();
+        let sums = row_sums(&turned, basis, 1);
         assert!(worst(&sums) < 1e-10, "{:e}", worst(&sums));
     }
 }
@@ -49,8 +48,8 @@ fn a_box_with_blocks_inside_is_closed() {
 #[test]
 fn a_furnace_is_uniform() {
     let scene = box_room(&[(DVec3::new(0.3, 0.3, 0.2), DVec3::new(0.5, 0.6, 0.7))]);
-    let operator = operator(&scene, Basis::Linear, 1);
-    let n = operator.row_sums().len();
+    let prepared = Prepared::new(&scene, Basis::Linear, Refinement::Levels(1));
+    let (operator, n) = (exact_of(&prepared), prepared.mesh.nodes());
     for rho in [0.1, 0.5, 0.9, 0.99] {
         let solution = solve(
             &|u, out| operator.apply(u, out),
@@ -71,11 +70,9 @@ fn a_furnace_is_uniform() {
 fn scenes_of_one_shape_have_one_solution() {
     let scene = scene_of("plates and a lamp");
     let irradiance = |scene: &lumel::scene::Scene| {
-        let mesh = mesh_of(scene, Basis::Linear, Refinement::Levels(2));
-        let occluders = occluders_of(scene);
-        let operator =
-            ExactOperator::build(&mesh, &occluders, u64::MAX, &Monitor::silent()).unwrap();
-        let (rho, e) = lumel::mesh::appearance(scene, &mesh);
+        let prepared = Prepared::new(scene, Basis::Linear, Refinement::Levels(2));
+        let operator = exact_of(&prepared);
+        let (rho, e) = lumel::mesh::appearance(scene, &prepared.mesh);
         let options = SolveOptions { residual: 1e-13, most_iterations: 500 };
         solve(&|u, out| operator.apply(u, out), &rho, &e, &options, &Monitor::silent())
             .unwrap()

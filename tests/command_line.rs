@@ -1,9 +1,8 @@
 //! The program as a user runs it: what is wrong is said, with the right exit code.
 
-use std::path::Path;
-use std::process::Output;
+mod command_support;
 
-use assert_cmd::Command;
+use command_support::*;
 use tempfile::TempDir;
 
 /// A floor of 4 square metres and, 2 m above it, a lamp that shines down; one camera.
@@ -51,39 +50,6 @@ fn room() -> TempDir {
     std::fs::write(room.path().join("floor.bin"), floor).unwrap();
     std::fs::write(room.path().join("points.csv"), "x,y,z,nx,ny,nz\n0,0,0,0,1,0\n").unwrap();
     room
-}
-
-/// Runs the program in `directory` with words separated by spaces.
-fn lumel(directory: &Path, words: &str) -> Output {
-    Command::cargo_bin("lumel")
-        .unwrap()
-        .current_dir(directory)
-        .args(words.split_whitespace())
-        .output()
-        .unwrap()
-}
-
-fn code(output: &Output) -> i32 {
-    output.status.code().unwrap()
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-/// Runs the program and demands an exit code and parts of the message.
-fn fails(directory: &Path, words: &str, wanted: i32, parts: &[&str]) {
-    let output = lumel(directory, words);
-    let message = stderr(&output);
-    assert_eq!(code(&output), wanted, "{words}: {message}");
-    assert_eq!(stdout(&output), "", "{words}: a failure prints no result");
-    for part in parts {
-        assert!(message.contains(part), "{words}: \"{part}\" is not in\n{message}");
-    }
 }
 
 #[test]
@@ -189,6 +155,33 @@ fn inspect_prints_what_was_read() {
     {
         assert!(text.contains(part), "\"{part}\" is not in\n{text}");
     }
+}
+
+#[test]
+fn inspect_forecasts_and_says_what_the_scene_lacks() {
+    let room = room();
+    let inspect = |words: &str| {
+        let output = lumel(room.path(), &format!("inspect room.gltf {words}"));
+        assert_eq!((code(&output), stderr(&output)), (0, String::new()), "{words}");
+        stdout(&output)
+    };
+    let text = inspect("--subdivide 2 --max-memory 1GiB");
+    for part in ["64 elements, 192 nodes", "1 GiB may be used"] {
+        assert!(text.contains(part), "\"{part}\" is not in\n{text}");
+    }
+    assert!(!text.contains("notices"), "{text}");
+    let text = inspect("--subdivide 4 --max-memory 1MB");
+    assert!(text.contains("but only 976.6 KiB") && text.contains("--max-edge"), "{text}");
+    let json: serde_json::Value =
+        serde_json::from_str(&inspect("--subdivide 4 --max-memory 1MB --json")).unwrap();
+    assert_eq!(json["forecast"]["elements"], 1024);
+    assert_eq!(json["forecast"]["fits"], false);
+    let dark = inspect("--emission *=0");
+    assert!(dark.contains("scene: nothing emits light") && dark.contains("floor, lamp"), "{dark}");
+    assert!(inspect("--light-scale 0").contains("--light-scale 0"));
+    assert!(inspect("--reflectance *=0").contains("nothing reflects light"));
+    let clamped = inspect("--reflectance floor=1.5");
+    assert!(clamped.contains("material \"floor\": reflectance (1.5"), "{clamped}");
 }
 
 #[test]

@@ -33,7 +33,7 @@ impl Random {
 }
 
 /// Integrals of G, G x, G y (about `about`) over a triangle by adaptive tensor Gauss rules, with
-/// G written with 3D vectors as in [AC] (1.2).
+/// G written with 3D vectors as in AC (1.2).
 struct Adaptive {
     rule: (Vec<f64>, Vec<f64>),
     receiver: DVec3,

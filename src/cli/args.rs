@@ -46,6 +46,8 @@ pub enum Command {
     Render(RenderArgs),
     /// Measure irradiance and radiosity at points given in a table
     Probe(ProbeArgs),
+    /// Repeat the experiments of Atkinson and Chien (2006), beside the printed tables
+    Reference(ReferenceArgs),
 }
 
 /// `lumel inspect`.
@@ -133,6 +135,34 @@ pub struct ProbeArgs {
     pub run: RunArgs,
 }
 
+/// `lumel reference`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+The surface, the solutions and the tables are those of K. Atkinson and D. Chien, A study of the
+fast solution of the occluded radiosity equation, 2006, sections 5 and 6. Times are CPU seconds.
+
+Examples:
+  lumel reference                                   all tables up to n = 2560, in seconds
+  lumel reference --table 6.5 --table 6.10 --max-n 40960
+  lumel reference --max-n 163840 --json > tables.jsonl")]
+pub struct ReferenceArgs {
+    /// Table to compute, 6.1 to 6.11; may be repeated [default: all]
+    #[arg(long = "table", value_name = "NUMBER", help_heading = None::<&str>)]
+    pub tables: Vec<String>,
+    /// Largest number of elements: 10, 40, 160, ... 163840
+    #[arg(long, value_name = "N", default_value = "2560", help_heading = None::<&str>)]
+    pub max_n: usize,
+    /// Print one JSON object a line instead of text
+    #[arg(long, help_heading = None::<&str>)]
+    pub json: bool,
+    /// Use no more memory for an operator than this: 2GiB, 500MB, 75% (of what there is)
+    #[arg(long, value_name = "SIZE", default_value = "75%", value_parser = values::memory_size, allow_negative_numbers = true, help_heading = None::<&str>)]
+    pub max_memory: MemorySize,
+    /// How to run.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
 /// The scene and how to read it.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Scene")]
@@ -209,6 +239,15 @@ pub struct SolveArgs {
     /// Refine every face this many times, into 4 elements each time
     #[arg(long, value_name = "LEVELS", value_parser = values::levels, allow_negative_numbers = true)]
     pub subdivide: Option<u32>,
+    /// How the operator of the equation is represented
+    #[arg(long, value_enum, default_value = "exact")]
+    pub operator: OperatorArg,
+    /// With --operator clustered: clusters of radius up to ETA times their distance are far
+    #[arg(long, value_name = "ETA", default_value = "0.25", value_parser = values::positive, allow_negative_numbers = true)]
+    pub eta: f64,
+    /// With --operator clustered: terms of total degree below M are kept of far clusters
+    #[arg(long, value_name = "M", default_value = "6")]
+    pub order: usize,
     /// Iterate until the relative residual is below this
     #[arg(long, value_name = "R", default_value = "1e-8", value_parser = values::residual, allow_negative_numbers = true)]
     pub residual: f64,
@@ -242,6 +281,16 @@ pub enum BasisArg {
     Constant,
     /// A plane through three values, discontinuous across edges
     Linear,
+}
+
+/// How the operator is represented.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum OperatorArg {
+    /// Every coefficient, exactly
+    Exact,
+    /// Exact near by and across shadows, Taylor polynomials far away: Hackbusch and Nowak's
+    /// clustering as in Atkinson and Chien (2006)
+    Clustered,
 }
 
 /// Bits a channel.

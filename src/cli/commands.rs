@@ -1,16 +1,18 @@
 //! The commands, each from its settings to its result.
 
+use std::path::Path;
+
 use lumel::output::camera_matrices::CameraMatrices;
 use lumel::output::csv;
 use lumel::output::picture::{Picture, Quantity, write_picture};
 use lumel::render::{self, RenderOptions};
-use lumel::{Error, Monitor, Result, probe};
+use lumel::{Error, Monitor, Result, probe, reference};
 
 use super::args::{Cli, Command};
 use super::progress::Progress;
 use super::session::Session;
-use super::settings::{InspectSettings, ProbeSettings, RenderSettings};
-use super::{console, inspect, interrupt, view};
+use super::settings::{InspectSettings, ProbeSettings, ReferenceSettings, RenderSettings};
+use super::{console, inspect, interrupt, reference_text, view};
 
 /// Does what was typed.
 pub fn run(cli: Cli) -> Result<()> {
@@ -18,7 +20,8 @@ pub fn run(cli: Cli) -> Result<()> {
     match cli.command {
         Command::Inspect(args) => inspect(&InspectSettings::new(args)?),
         Command::Render(args) => render(&RenderSettings::new(args)?),
-        Command::Probe(args) => probe(&ProbeSettings::new(args)),
+        Command::Probe(args) => probe(&ProbeSettings::new(args)?),
+        Command::Reference(args) => tables(&ReferenceSettings::new(args)),
     }
 }
 
@@ -32,9 +35,8 @@ fn inspect(settings: &InspectSettings) -> Result<()> {
 
     let scene = session.read(&settings.scene, &monitor)?;
     let view = view::choose(&scene, &settings.view)?;
-    let description = session
-        .clock
-        .time("describe", || inspect::describe(&scene, &view, settings.solve.max_memory));
+    let forecast = session.forecast(&scene, &settings.solve)?;
+    let description = session.clock.time("describe", || inspect::describe(&scene, &view, forecast));
     progress.clear();
     let text = if settings.json {
         let json = serde_json::to_string_pretty(&description);
@@ -112,6 +114,31 @@ fn probe(settings: &ProbeSettings) -> Result<()> {
     match output {
         Some(path) => csv::write_results(path, &points, &results)?,
         None => console::print(&csv::format_results(&points, &results))?,
+    }
+    session.finish()
+}
+
+fn tables(settings: &ReferenceSettings) -> Result<()> {
+    let paper = Path::new("Atkinson and Chien 2006");
+    let mut session =
+        Session::begin("reference", paper, &[], None, settings.described(), &settings.run)?;
+    let progress = Progress::new(settings.run.quiet);
+    let tell = |stage, done, total| progress.hear(stage, done, total);
+    let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
+    // JSON lines go out as they are found: a long run shows what it has.
+    let mut printed = Ok(());
+    let rows = session.clock.time("reference", || {
+        reference::run(&settings.options, &monitor, &mut |row| {
+            if settings.json && printed.is_ok() {
+                progress.clear();
+                printed = reference_text::json_line(row).and_then(|line| console::print(&line));
+            }
+        })
+    })?;
+    progress.clear();
+    printed?;
+    if !settings.json {
+        console::print(&reference_text::tables(&rows))?;
     }
     session.finish()
 }

@@ -7,7 +7,8 @@ use lumel::scene::{self, Camera, Projection, Scene};
 use serde::Serialize;
 
 use super::console;
-use super::table::{Table, bytes, figure, figures};
+use super::forecast::Forecast;
+use super::table::{Table, figure, figures};
 use super::view::View;
 
 /// A scene in numbers. Colours are red, green, blue; lengths are metres.
@@ -26,8 +27,8 @@ pub struct Description {
     power: [f64; 3],
     cameras: Vec<CameraLine>,
     view: ViewLine,
-    /// Bytes that may be used.
-    max_memory: Option<u64>,
+    /// What solving it would take.
+    forecast: Forecast,
     notices: Vec<NoticeLine>,
 }
 
@@ -92,8 +93,8 @@ struct Sums {
     emitted: DVec3,
 }
 
-/// Describes a scene and the view that a picture of it would have.
-pub fn describe(scene: &Scene, view: &View, max_memory: Option<u64>) -> Description {
+/// Describes a scene, the view that a picture of it would have and what solving it would take.
+pub fn describe(scene: &Scene, view: &View, forecast: Forecast) -> Description {
     let whole_face = [DVec3::X, DVec3::Y, DVec3::Z];
     let mut sums = vec![Sums::default(); scene.materials.len()];
     for (index, triangle) in scene.triangles.iter().enumerate() {
@@ -129,7 +130,7 @@ pub fn describe(scene: &Scene, view: &View, max_memory: Option<u64>) -> Descript
             width: view.width,
             height: view.height,
         },
-        max_memory,
+        forecast,
         notices: scene
             .notices
             .iter()
@@ -214,9 +215,9 @@ impl Description {
                 self.view.height
             ),
         );
-        if let Some(count) = self.max_memory {
-            line("memory", format!("{} may be used", bytes(count)));
-        }
+        let Forecast { elements, nodes, .. } = self.forecast;
+        line("mesh", format!("{elements} elements, {nodes} nodes"));
+        line("operator", self.forecast.memory_text());
         let mut text = summary.to_text();
         text.push_str(&self.materials_text());
         text.push_str(&self.emitters_text());
@@ -250,9 +251,7 @@ impl Description {
         let emitters: Vec<&MaterialLine> =
             self.materials.iter().filter(|m| m.radiance.iter().any(|&v| v > 0.0)).collect();
         if emitters.is_empty() {
-            return "\nemitters (0)\n  nothing emits light: give a material some with \
-                    --emission NAME=R,G,B\n"
-                .into();
+            return "\nemitters (0)\n".into();
         }
         let mut table =
             Table::new(&["material", "faces", "area m^2", "mean radiance W/(m^2 sr)", "power W"]);
@@ -340,10 +339,18 @@ mod tests {
         }
     }
 
+    const FORECAST: Forecast = Forecast {
+        elements: 8,
+        nodes: 24,
+        operator_bytes: 1 << 20,
+        max_memory: Some(3 << 30),
+        fits: true,
+    };
+
     fn description() -> Description {
         let scene = scene();
         let view = View { camera: scene.cameras[0].clone(), width: 960, height: 540 };
-        describe(&scene, &view, Some(3 << 30))
+        describe(&scene, &view, FORECAST)
     }
 
     #[test]
@@ -364,9 +371,10 @@ mod tests {
     fn the_text_shows_each_part() {
         let text = description().to_text();
         for part in [
-            "  scene    rooms/s.gltf\n",
-            "  faces    3 (4 sides that radiate)\n",
-            "  memory   3 GiB may be used\n",
+            "  scene     rooms/s.gltf\n",
+            "  faces     3 (4 sides that radiate)\n",
+            "  mesh      8 elements, 24 nodes\n",
+            "  operator  about 1 MiB; 3 GiB may be used\n",
             "\nmaterials (3)\n",
             "  floor       2         2      1  0.5 0.25 0.125\n",
             "\nemitters (1)\n",
@@ -380,19 +388,12 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_without_lamps_says_what_to_do() {
-        let mut dark = scene();
-        dark.materials[1].radiance = DVec3::ZERO;
-        let view = View { camera: dark.cameras[0].clone(), width: 1, height: 1 };
-        assert!(describe(&dark, &view, None).to_text().contains("--emission"));
-    }
-
-    #[test]
     fn the_json_has_the_same_numbers() {
         let json = serde_json::to_value(description()).unwrap();
         assert_eq!(json["faces"], 3);
         assert_eq!(json["materials"][1]["name"], "lamp");
         assert_eq!(json["cameras"][0]["projection"], "perspective");
+        assert_eq!(json["forecast"]["nodes"], 24);
         assert_eq!(json["notices"][0]["count"], 2);
         assert!(json["notices"][0].get("line").is_none());
     }

@@ -4,12 +4,15 @@
 //! Results go to standard output or a file; progress and warnings go to standard error, and
 //! progress only to a terminal ([`console`], [`progress`]).
 
+pub mod advice;
 pub mod args;
 pub mod commands;
 pub mod console;
+pub mod forecast;
 pub mod inspect;
 pub mod interrupt;
 pub mod progress;
+pub mod reference_text;
 pub mod session;
 pub mod settings;
 pub mod table;

@@ -9,6 +9,8 @@ use lumel::scene::{self, Scene};
 use lumel::solve::light::{self, Light};
 use lumel::{Error, Monitor, Result};
 
+use super::advice::advice;
+use super::forecast::Forecast;
 use super::settings::{Described, RunSettings, SceneSettings, SolveSettings};
 
 /// One run of a command.
@@ -55,10 +57,13 @@ impl Session {
         Ok(Session { clock: StageClock::new(), report, report_path: run.report.clone() })
     }
 
-    /// Reads the scene and notes what was found.
+    /// Reads the scene and notes what was found, and what it lacks.
     pub fn read(&mut self, settings: &SceneSettings, monitor: &Monitor) -> Result<Scene> {
         let stage = monitor.stage("read", 1);
-        let scene = self.clock.time("read", || scene::read(&settings.path, &settings.options))?;
+        let mut scene =
+            self.clock.time("read", || scene::read(&settings.path, &settings.options))?;
+        // What concerns the whole scene comes first.
+        scene.notices.splice(0..0, advice(&scene, settings.options.light_scale));
         stage.advance(1)?;
         self.report.count("objects", scene.objects.len());
         self.report.count("faces", scene.triangles.len());
@@ -66,6 +71,15 @@ impl Session {
         self.report.count("cameras", scene.cameras.len());
         self.report.add_notices(&scene.notices);
         Ok(scene)
+    }
+
+    /// Forecasts what solving the scene takes.
+    pub fn forecast(&mut self, scene: &Scene, settings: &SolveSettings) -> Result<Forecast> {
+        let forecast = self.clock.time("forecast", || Forecast::new(scene, settings))?;
+        self.report.count("elements", forecast.elements);
+        self.report.count("nodes", forecast.nodes);
+        self.report.value("operator bytes forecast", forecast.operator_bytes as f64);
+        Ok(forecast)
     }
 
     /// Solves the scene and notes how it went.
@@ -94,14 +108,15 @@ impl Session {
             ("faces turned away from a node", counts.faces_away),
             ("faces clear of occluders", counts.faces_clear),
             ("faces with occluders between", counts.faces_shaded),
-            ("elements fully visible", counts.full),
-            ("elements partly visible", counts.partial),
-            ("elements hidden", counts.hidden),
+            ("far clusters", counts.far),
+            ("near elements", counts.near),
+            ("gray elements", counts.gray),
+            ("hidden elements", counts.hidden),
         ] {
             report.count(name, count as usize);
         }
         report.value("operator bytes", light.bytes as f64);
-        report.value("operator bytes forecast", light.forecast.bytes as f64);
+        report.value("operator bytes forecast", light.forecast as f64);
         report.value("smallest row sum", light.row_sums.0);
         report.value("largest row sum", light.row_sums.1);
         report.channels("residual", light.solution.residual.to_array());

@@ -8,15 +8,17 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 use lumel::mesh::{self, Basis, MeshOptions};
+use lumel::operator::{ClusteredOptions, OperatorKind};
 use lumel::output::machine;
 use lumel::output::picture::{PictureFormat, PictureOptions};
+use lumel::reference::ReferenceOptions;
 use lumel::scene::{Override, ReadOptions};
 use lumel::solve::{LightOptions, SolveOptions};
 use lumel::{Error, Result};
 
 use super::args::{
-    BasisArg, BitsArg, InspectArgs, PictureArgs, ProbeArgs, RenderArgs, RunArgs, SceneArgs,
-    SolveArgs, ViewArgs,
+    BasisArg, BitsArg, InspectArgs, OperatorArg, PictureArgs, ProbeArgs, ReferenceArgs, RenderArgs,
+    RunArgs, SceneArgs, SolveArgs, ViewArgs,
 };
 use super::values::MemorySize;
 
@@ -89,6 +91,8 @@ pub struct SolveSettings {
     pub basis: BasisArg,
     /// How the mesh is refined.
     pub refinement: Refinement,
+    /// How the operator is represented.
+    pub operator: OperatorKind,
     /// Relative residual to reach.
     pub residual: f64,
     /// Bytes of memory that may be used; none where it is not known how many there are.
@@ -165,7 +169,7 @@ impl InspectSettings {
         Ok(InspectSettings {
             scene: scene(args.scene),
             view: view(args.view)?,
-            solve: solve(&args.solve),
+            solve: solve(&args.solve)?,
             run: run(args.run),
             json: args.json,
         })
@@ -197,7 +201,7 @@ impl RenderSettings {
             picture: PictureOptions { exposure_ev: exposure, png_bits },
             gather,
             samples,
-            solve: solve(&args.solve),
+            solve: solve(&args.solve)?,
             run: run(args.run),
         })
     }
@@ -226,14 +230,14 @@ impl RenderSettings {
 
 impl ProbeSettings {
     /// Checks what was typed.
-    pub fn new(args: ProbeArgs) -> Self {
-        ProbeSettings {
+    pub fn new(args: ProbeArgs) -> Result<Self> {
+        Ok(ProbeSettings {
             scene: scene(args.scene),
             points: args.points,
             output: args.output,
-            solve: solve(&args.solve),
+            solve: solve(&args.solve)?,
             run: run(args.run),
-        }
+        })
     }
 
     /// For the report.
@@ -242,6 +246,46 @@ impl ProbeSettings {
         list.push(pair("points", self.points.display()));
         list.extend(self.output.iter().map(|path| pair("output", path.display())));
         list.extend(self.solve.described());
+        list.extend(self.run.described());
+        list
+    }
+}
+
+/// `lumel reference`.
+#[derive(Clone, Debug)]
+pub struct ReferenceSettings {
+    /// What is computed.
+    pub options: ReferenceOptions,
+    /// Whether to print JSON.
+    pub json: bool,
+    /// How to run.
+    pub run: RunSettings,
+}
+
+impl ReferenceSettings {
+    /// Checks what was typed.
+    pub fn new(args: ReferenceArgs) -> Self {
+        let limit = max_memory(args.max_memory, machine::usable_memory());
+        ReferenceSettings {
+            options: ReferenceOptions {
+                tables: args.tables,
+                max_n: args.max_n,
+                max_memory: limit.unwrap_or(u64::MAX),
+            },
+            json: args.json,
+            run: run(args.run),
+        }
+    }
+
+    /// For the report.
+    pub fn described(&self) -> Described {
+        let mut list = vec![
+            pair("max-n", self.options.max_n),
+            pair("max-memory", format!("{} B", self.options.max_memory)),
+        ];
+        if !self.options.tables.is_empty() {
+            list.push(pair("tables", self.options.tables.join(" ")));
+        }
         list.extend(self.run.described());
         list
     }
@@ -301,6 +345,7 @@ impl SolveSettings {
         };
         LightOptions {
             mesh: MeshOptions { basis, refinement },
+            operator: self.operator,
             solve: SolveOptions { residual: self.residual, ..SolveOptions::default() },
             max_memory: self.max_memory.unwrap_or(u64::MAX),
         }
@@ -317,6 +362,14 @@ impl SolveSettings {
             Refinement::Usual => {}
             Refinement::MaxEdge(length) => list.push(pair("max-edge", length)),
             Refinement::Levels(levels) => list.push(pair("subdivide", levels)),
+        }
+        match self.operator {
+            OperatorKind::Exact => list.push(pair("operator", "exact")),
+            OperatorKind::Clustered(ClusteredOptions { eta, order }) => {
+                list.push(pair("operator", "clustered"));
+                list.push(pair("eta", eta));
+                list.push(pair("order", order));
+            }
         }
         list
     }
@@ -378,18 +431,25 @@ fn up(eye: DVec3, look_at: DVec3, typed: Option<DVec3>) -> Result<DVec3> {
     }
 }
 
-fn solve(args: &SolveArgs) -> SolveSettings {
+fn solve(args: &SolveArgs) -> Result<SolveSettings> {
     let refinement = match (args.max_edge, args.subdivide) {
         (Some(length), _) => Refinement::MaxEdge(length),
         (None, Some(levels)) => Refinement::Levels(levels),
         (None, None) => Refinement::Usual,
     };
-    SolveSettings {
+    let operator = match args.operator {
+        OperatorArg::Exact => OperatorKind::Exact,
+        OperatorArg::Clustered => {
+            OperatorKind::Clustered(ClusteredOptions::new(args.eta, args.order)?)
+        }
+    };
+    Ok(SolveSettings {
         basis: args.basis,
         refinement,
+        operator,
         residual: args.residual,
         max_memory: max_memory(args.max_memory, machine::usable_memory()),
-    }
+    })
 }
 
 /// A limit in bytes. A share of a memory whose size the system does not tell is no limit.

@@ -1,4 +1,4 @@
-//! Smallest enclosing circles of triangles: A(tau) and R(tau) of [AC] section 2.
+//! Smallest enclosing circles of triangles: A(tau) and R(tau) of AC section 2.
 
 use glam::DVec2;
 

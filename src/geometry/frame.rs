@@ -35,15 +35,32 @@ impl Frame {
     }
 
     /// Frame of a triangle, normal by the right-hand rule; `None` when it has no area.
+    ///
+    /// The normal is perpendicular to the longest edge to a rounding, however thin the triangle is:
+    /// its corners lie in the plane, and so do the corners of its neighbours in the same plane. (A
+    /// cross product of two edges leaves one rounding over the sine of their angle.)
     pub fn of_triangle(t: &[DVec3; 3]) -> Option<Frame> {
+        let edges = [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
         // Scaled first, so that tiny and huge triangles neither underflow nor overflow.
-        let (a, b) = (t[1] - t[0], t[2] - t[0]);
-        let size = a.abs().max(b.abs()).max_element();
+        let size = edges.iter().map(|e| e.abs().max_element()).fold(0.0, f64::max);
         if !(size > 0.0 && size.is_finite()) {
             return None;
         }
-        let n = (a / size).cross(b / size).try_normalize()?;
-        Some(Frame::new(t[0], n))
+        let [e0, e1, e2] = edges.map(|e| e / size);
+        let (l0, l1, l2) = (e0.length_squared(), e1.length_squared(), e2.length_squared());
+        let (longest, next) = if l0 >= l1 && l0 >= l2 {
+            (e0, e1)
+        } else if l1 >= l2 {
+            (e1, e2)
+        } else {
+            (e2, e0)
+        };
+        let along = longest.normalize();
+        let n = along.cross(next - along.dot(next) * along);
+        let length = n.length();
+        // Divided, not multiplied by a reciprocal: the normals of planes parallel to coordinate
+        // planes come out exact.
+        (length > 0.0).then(|| Frame::new(t[0], n / length))
     }
 
     /// Coordinates of the foot of `x` on the plane.

@@ -14,10 +14,13 @@ use super::{Moments, View};
 const MOST_POINTS: usize = 16;
 
 /// One rule on the unit simplex {x, y >= 0, x + y <= 1}, weights summing to 1/2.
-struct Rule {
-    x: Vec<f64>,
-    y: Vec<f64>,
-    weight: Vec<f64>,
+pub struct Rule {
+    /// First coordinates.
+    pub x: Vec<f64>,
+    /// Second coordinates.
+    pub y: Vec<f64>,
+    /// Weights.
+    pub weight: Vec<f64>,
 }
 
 static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {
@@ -37,6 +40,11 @@ static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {
         .collect()
 });
 
+/// The rule with `points` points a direction (1 to 16), exact to degree 2 points - 2.
+pub fn rule(points: usize) -> &'static Rule {
+    &RULES[points.clamp(1, MOST_POINTS)]
+}
+
 /// Points a direction that reach 1e-12 for a polygon of radius `ratio` times its distance.
 pub fn points_for(ratio: f64) -> usize {
     const LADDER: [(f64, usize); 5] =
@@ -46,7 +54,7 @@ pub fn points_for(ratio: f64) -> usize {
 
 /// Integrals over a convex polygon with `points` Gauss points a direction and triangle (1 to 16).
 pub fn moments(view: &View, polygon: &[DVec2], about: DVec2, points: usize) -> Moments {
-    let rule = &RULES[points.clamp(1, MOST_POINTS)];
+    let rule = rule(points);
     let mut sum = Moments::default();
     let origin = polygon[0];
     let d2 = view.d * view.d;

@@ -2,7 +2,7 @@
 //!
 //! Every input triangle has one [`Face`] a radiating side. A face is covered by [`Root`]s (itself,
 //! or the parts into which contacts with other faces cut it), each refined uniformly: edge
-//! midpoints are joined, four congruent children ([AC] section 2). The elements of a root are its
+//! midpoints are joined, four congruent children (AC section 2). The elements of a root are its
 //! finest triangles in the order of its quadtree, so each subtree is a range of elements.
 
 mod appearance;
@@ -20,10 +20,10 @@ use crate::geometry::{Bounds, Frame};
 pub use appearance::{appearance, face_weights};
 pub use build::{MeshOptions, build};
 pub use contacts::{CONTACT, Contacts};
-pub use refine::{Refinement, child, level_for};
+pub use refine::{DEEPEST, Refinement, child, level_for};
 pub use seams::{Seam, Side};
 
-/// Position of the interior nodes of linear elements, [AC] (2.5); 0 < alpha < 1/3.
+/// Position of the interior nodes of linear elements, AC (2.5); 0 < alpha < 1/3.
 pub const ALPHA: f64 = 1.0 / 6.0;
 
 /// Polynomials on an element.
@@ -31,12 +31,12 @@ pub const ALPHA: f64 = 1.0 / 6.0;
 pub enum Basis {
     /// One value an element, collocated at the centroid.
     Constant,
-    /// Three values an element, collocated at the interior nodes of [AC] (2.5).
+    /// Three values an element, collocated at the interior nodes of AC (2.5).
     Linear,
 }
 
 impl Basis {
-    /// Values (and collocation nodes) an element: nu in [AC] section 2.2.
+    /// Values (and collocation nodes) an element: nu in AC section 2.2.
     pub fn nodes(self) -> usize {
         match self {
             Basis::Constant => 1,

@@ -5,10 +5,10 @@ use std::mem::size_of;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::walk::{Counts, Walker};
+use super::walk::{Counts, Stage, Walker};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::monitor::Monitor;
+use crate::monitor::{self, Monitor};
 use crate::visibility::Occluders;
 
 /// Rows that one task builds: enough to share its memory, few enough to share out evenly.
@@ -73,13 +73,9 @@ impl ExactOperator {
     /// Builds all rows, in parallel; the result does not depend on the number of threads.
     ///
     /// [`Error::Memory`] when the forecast exceeds `max_memory` bytes.
-    pub fn build(
-        mesh: &Mesh,
-        occluders: &Occluders,
-        max_memory: u64,
-        monitor: &Monitor,
-    ) -> Result<ExactOperator> {
-        let forecast = forecast(mesh, occluders);
+    pub fn build(stage: Stage, max_memory: u64, monitor: &Monitor) -> Result<ExactOperator> {
+        let mesh = stage.mesh;
+        let forecast = forecast(mesh, stage.occluders);
         if forecast.bytes > max_memory {
             return Err(Error::Memory {
                 what: format!(
@@ -95,14 +91,13 @@ impl ExactOperator {
             });
         }
         let nodes = mesh.nodes();
-        let stage = monitor.stage("rows", nodes as u64);
+        let progress = monitor.stage("rows", nodes as u64);
         let starts: Vec<usize> = (0..nodes).step_by(ROWS_PER_TASK).collect();
         let chunks: Vec<Chunk> = starts
             .par_iter()
             .map_init(Walker::default, |walker, &start| {
                 let rows = start..(start + ROWS_PER_TASK).min(nodes);
-                stage.advance(rows.len() as u64)?;
-                Ok(chunk(walker, mesh, occluders, rows))
+                chunk(walker, stage, rows, &progress)
             })
             .collect::<Result<_>>()?;
         let mut counts = Counts::default();
@@ -142,28 +137,21 @@ impl ExactOperator {
             }
         });
     }
-
-    /// Sums of the rows over pi: the share of the hemisphere that is filled by radiating surfaces,
-    /// 1 in a closed scene.
-    pub fn row_sums(&self) -> Vec<f64> {
-        let mut out = vec![DVec3::ZERO; self.nodes];
-        self.apply(&vec![DVec3::ONE; self.nodes], &mut out);
-        out.iter().map(|h| h.x / std::f64::consts::PI).collect()
-    }
 }
 
 fn chunk(
     walker: &mut Walker,
-    mesh: &Mesh,
-    occluders: &Occluders,
+    stage: Stage,
     rows: std::ops::Range<usize>,
-) -> Chunk {
+    progress: &monitor::Stage,
+) -> Result<Chunk> {
     walker.counts = Counts::default();
-    let n = mesh.basis.nodes();
+    let n = stage.mesh.basis.nodes();
     let (mut ends, mut elements, mut coefficients) = (vec![], vec![], vec![]);
     for node in rows {
-        let (point, normal) = mesh.node(node);
-        walker.row(mesh, occluders, point, normal, |element, c| {
+        progress.advance(1)?;
+        let (point, normal) = stage.mesh.node(node);
+        walker.row(stage, point, normal, |element, c| {
             elements.push(element);
             coefficients.extend_from_slice(&c[..n]);
         });
@@ -171,5 +159,5 @@ fn chunk(
     }
     elements.shrink_to_fit();
     coefficients.shrink_to_fit();
-    Chunk { ends, elements, coefficients, counts: walker.counts }
+    Ok(Chunk { ends, elements, coefficients, counts: walker.counts })
 }

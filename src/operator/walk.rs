@@ -1,16 +1,20 @@
-//! The exact row of a point: what it sees of every element.
+//! What a point sees of the surface: its minimal admissible covering, and its exact row.
 //!
-//! Each face is looked at as a whole first: turned away, below the horizon, unoccluded, hidden. Its
-//! quadtrees are then descended with the list of shadows narrowed on the way, until a subtree is
-//! proved fully visible or hidden. What remains are elements that a shadow line or the horizon
-//! crosses; their visible parts are cut out exactly.
+//! Faces that are turned away are passed over, many at once. Each other face is looked at as a
+//! whole first: below the horizon, unoccluded, hidden. Its quadtrees are then descended with the
+//! list of shadows narrowed on the way, until a cluster is proved hidden, or fully visible and far
+//! enough. What remains are near elements, and gray ones that a shadow line crosses; their visible
+//! parts are cut out exactly.
 
 use glam::{DVec2, DVec3};
 
+use crate::cluster::{Clusters, admissible};
 use crate::geometry::Pieces;
 use crate::geometry::polygon::Linear;
-use crate::kernel::{Moments, View, moments_above};
-use crate::mesh::{ALPHA, Basis, Face, Mesh, child};
+use crate::gray;
+use crate::kernel::{Moments, View};
+use crate::mesh::{Basis, Face, Mesh, child};
+use crate::near;
 use crate::visibility::{Coverage, Observer, Occluders, Shadows};
 
 /// What was met on the way; the report shows it.
@@ -22,10 +26,12 @@ pub struct Counts {
     pub faces_shaded: u64,
     /// Faces without.
     pub faces_clear: u64,
-    /// Elements fully visible.
-    pub full: u64,
-    /// Elements partly visible.
-    pub partial: u64,
+    /// Clusters in the far field.
+    pub far: u64,
+    /// Elements in the near field: fully visible.
+    pub near: u64,
+    /// Elements in the gray field: partly visible.
+    pub gray: u64,
     /// Elements hidden.
     pub hidden: u64,
 }
@@ -35,8 +41,9 @@ impl std::ops::AddAssign for Counts {
         self.faces_away += o.faces_away;
         self.faces_shaded += o.faces_shaded;
         self.faces_clear += o.faces_clear;
-        self.full += o.full;
-        self.partial += o.partial;
+        self.far += o.far;
+        self.near += o.near;
+        self.gray += o.gray;
         self.hidden += o.hidden;
     }
 }
@@ -46,33 +53,80 @@ impl std::ops::AddAssign for Counts {
 pub struct Walker {
     shadows: Shadows,
     active: Vec<u32>,
+    facing: Vec<u32>,
+    stack: Vec<u32>,
     clip: Pieces,
     /// What was met since this was last reset.
     pub counts: Counts,
 }
 
+/// The surface that points look at.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    /// Elements.
+    pub mesh: &'a Mesh,
+    /// Clusters of them.
+    pub clusters: &'a Clusters,
+    /// What blocks light.
+    pub occluders: &'a Occluders,
+}
+
 /// One face as seen from the current point.
-struct Scope<'a> {
-    face: &'a Face,
-    view: View,
-    horizon: Linear,
-    basis: Basis,
+pub struct Scope<'a> {
+    /// The face.
+    pub face: &'a Face,
+    /// Number of the face.
+    pub index: u32,
+    /// The point in the face's frame.
+    pub view: View,
+    /// Height above the point's horizon.
+    pub horizon: Linear,
+}
+
+/// Something that a point sees: the members of its minimal admissible covering.
+pub enum Seen<'a> {
+    /// A fully visible, admissible cluster above the horizon.
+    Far(u32),
+    /// A fully visible element that is not admissible (or that the horizon crosses).
+    Near(u32, &'a [DVec2; 3]),
+    /// An element that is partly visible, and its visible pieces.
+    Gray(u32, &'a [DVec2; 3], &'a Pieces),
+}
+
+/// Where the walk stands in a root's quadtree.
+#[derive(Clone, Copy)]
+struct Place {
+    root: u32,
+    /// Levels above and below.
+    depth: u32,
+    level: u32,
+    /// Number along its level, and its radius.
+    index: u32,
+    radius: f64,
 }
 
 impl Walker {
-    /// Calls `entry` with each element that `point` (unit `normal`) sees something of, in order,
-    /// and the integrals of G V times its basis functions.
-    pub fn row(
+    /// Calls `seen` with each member of the unique minimal admissible covering of the surface, as
+    /// seen from `point` with unit `normal`, that is not hidden, face by face in ascending order.
+    ///
+    /// A cluster is far when it is admissible with `eta` (AC (3.3)), wholly above the horizon and
+    /// proved fully visible. With eta = 0 nothing is far: the exact row.
+    pub fn cover(
         &mut self,
-        mesh: &Mesh,
-        occluders: &Occluders,
+        stage: Stage,
         point: DVec3,
         normal: DVec3,
-        mut entry: impl FnMut(u32, [f64; 3]),
+        eta: f64,
+        mut seen: impl FnMut(&Scope, Seen),
     ) {
+        let Stage { mesh, clusters, occluders } = stage;
         let observer = Observer { occluders, point, normal };
         let tau = occluders.coincidence();
-        for face in &mesh.faces {
+        clusters.faces.facing(point, normal, tau, &mut self.facing, &mut self.stack);
+        self.counts.faces_away += (mesh.faces.len() - self.facing.len()) as u64;
+        for k in 0..self.facing.len() {
+            let index = self.facing[k];
+            let face = &mesh.faces[index as usize];
             let view = View::new(&face.frame, point, normal);
             if view.d <= tau || observer.faces_away(face.frame.n) {
                 self.counts.faces_away += 1;
@@ -90,93 +144,114 @@ impl Walker {
             } else {
                 self.counts.faces_shaded += 1;
             }
-            let scope = Scope { face, view, horizon, basis: mesh.basis };
-            for r in face.roots.0..face.roots.1 {
-                let root = &mesh.roots[r as usize];
-                self.descend(&scope, &root.corners, root.level, root.first, 0, &mut entry);
+            let scope = Scope { face, index, view, horizon };
+            for root in face.roots.0..face.roots.1 {
+                let r = &mesh.roots[root as usize];
+                let radius = clusters.root_radius[root as usize];
+                let place = Place { root, depth: 0, level: r.level, index: 0, radius };
+                self.descend(stage, &scope, place, &r.corners, eta, 0, &mut seen);
             }
         }
     }
 
-    /// Handles a quadtree node with `level` levels below it, whose first element is `first`;
-    /// `active[from..]` are the shadows that may touch its parent.
+    /// Handles one cluster; `active[from..]` are the shadows that may touch its parent.
+    #[allow(clippy::too_many_arguments)]
     fn descend(
         &mut self,
+        stage: Stage,
         scope: &Scope,
+        place: Place,
         corners: &[DVec2; 3],
-        level: u32,
-        first: u32,
+        eta: f64,
         from: usize,
-        entry: &mut impl FnMut(u32, [f64; 3]),
+        seen: &mut impl FnMut(&Scope, Seen),
     ) {
         if scope.horizon.nowhere_positive(corners) {
             return;
         }
         let to = self.active.len();
-        if from < to {
-            match self.shadows.narrow(corners, &mut self.active, from) {
-                Coverage::Hidden => {
-                    self.counts.hidden += 1 << (2 * level);
-                    return;
-                }
-                // No shadow left is nothing left to narrow: `from == to` from here on.
-                Coverage::Full | Coverage::Partial => {}
+        if from < to && self.shadows.narrow(corners, &mut self.active, from) == Coverage::Hidden {
+            self.counts.hidden += 1 << (2 * place.level);
+            return;
+        }
+        let clear = self.active.len() == to;
+        let element = || stage.mesh.roots[place.root as usize].first + place.index;
+        if clear && eta > 0.0 {
+            let number = stage.clusters.number(place.root as usize, place.depth, place.index);
+            let to_centre = stage.clusters.centre[number as usize] - scope.view.foot;
+            let distance_squared = to_centre.length_squared() + scope.view.d * scope.view.d;
+            if admissible(place.radius, eta, distance_squared)
+                && scope.horizon.nowhere_negative(corners)
+            {
+                self.counts.far += 1;
+                seen(scope, Seen::Far(number));
+                return;
             }
         }
-        if level > 0 {
-            let quarter = 1u32 << (2 * (level - 1));
+        if place.level > 0 {
             for k in 0..4 {
-                let child = child(corners, k);
-                self.descend(scope, &child, level - 1, first + k as u32 * quarter, to, entry);
+                let below = Place {
+                    depth: place.depth + 1,
+                    level: place.level - 1,
+                    index: 4 * place.index + k,
+                    radius: 0.5 * place.radius,
+                    ..place
+                };
+                self.descend(stage, scope, below, &child(corners, k as usize), eta, to, seen);
             }
+        } else if clear {
+            self.counts.near += 1;
+            seen(scope, Seen::Near(element(), corners));
         } else {
-            let moments = self.element(scope, corners, to);
-            if moments != Moments::default() {
-                entry(first, coefficients(moments, corners, scope.basis));
+            let pieces = self.shadows.visible(corners, &self.active[to..]);
+            if pieces.is_empty() {
+                self.counts.hidden += 1;
+            } else {
+                self.counts.gray += 1;
+                seen(scope, Seen::Gray(element(), corners, pieces));
             }
         }
         self.active.truncate(to);
     }
 
-    /// Moments about its centroid of what is visible of one element; `active[to..]` shade it.
-    fn element(&mut self, scope: &Scope, corners: &[DVec2; 3], to: usize) -> Moments {
-        let centroid = (corners[0] + corners[1] + corners[2]) / 3.0;
-        if self.active.len() == to {
-            self.counts.full += 1;
-            return moments_above(&scope.view, corners, centroid, &scope.horizon, &mut self.clip);
-        }
-        let mut sum = Moments::default();
-        let pieces = self.shadows.visible(corners, &self.active[to..]);
-        for piece in pieces.iter() {
-            sum += moments_above(&scope.view, piece, centroid, &scope.horizon, &mut self.clip);
-        }
-        if pieces.is_empty() {
-            self.counts.hidden += 1;
-        } else {
-            self.counts.partial += 1;
-        }
-        sum
+    /// Calls `entry` with each element that `point` (unit `normal`) sees something of, in order,
+    /// and the integrals of G V times its basis functions: the exact row.
+    pub fn row(
+        &mut self,
+        stage: Stage,
+        point: DVec3,
+        normal: DVec3,
+        mut entry: impl FnMut(u32, [f64; 3]),
+    ) {
+        let basis = stage.mesh.basis;
+        let mut clip = std::mem::take(&mut self.clip);
+        self.cover(stage, point, normal, 0.0, |scope, seen| {
+            if let Some((element, c)) = exact_entry(scope, seen, basis, &mut clip) {
+                entry(element, c);
+            }
+        });
+        self.clip = clip;
     }
 }
 
-/// Turns moments of G V about an element's centroid into integrals of G V times its basis
-/// functions: the collocation integrals of [AC] (2.9), without rho/pi.
-pub fn coefficients(m: Moments, element: &[DVec2; 3], basis: Basis) -> [f64; 3] {
-    match basis {
-        Basis::Constant => [m.zeroth, 0.0, 0.0],
-        Basis::Linear => {
-            let [v1, v2, v3] = *element;
-            let twice = (v2 - v1).perp_dot(v3 - v1);
-            // The barycentric weight of a corner is 1/3 + gradient . (x - centroid), with the
-            // gradient normal to the opposite edge.
-            let weight = |opposite: DVec2| {
-                let gradient = DVec2::new(-opposite.y, opposite.x) / twice;
-                m.zeroth / 3.0 + gradient.dot(m.first)
-            };
-            let l = |w: f64| (w - ALPHA * m.zeroth) / (1.0 - 3.0 * ALPHA);
-            [l(weight(v2 - v1)), l(weight(v1 - v3)), l(weight(v3 - v2))]
+/// Element and exact coefficients of a near or gray member of a covering; `None` for a far one,
+/// and where nothing lies above the horizon.
+pub fn exact_entry(
+    scope: &Scope,
+    seen: Seen,
+    basis: Basis,
+    clip: &mut Pieces,
+) -> Option<(u32, [f64; 3])> {
+    let (element, corners, moments) = match seen {
+        Seen::Far(_) => return None,
+        Seen::Near(e, corners) => {
+            (e, corners, near::moments(&scope.view, &scope.horizon, corners, clip))
         }
-    }
+        Seen::Gray(e, corners, pieces) => {
+            (e, corners, gray::moments(&scope.view, &scope.horizon, corners, pieces, clip))
+        }
+    };
+    (moments != Moments::default()).then(|| (element, near::coefficients(moments, corners, basis)))
 }
 
 /// Irradiance H = 1/pi int u G V at a point with the given unit normal: iterated collocation.
@@ -184,15 +259,14 @@ pub fn coefficients(m: Moments, element: &[DVec2; 3], basis: Basis) -> [f64; 3] 
 /// `values` holds the radiosities at the nodes, per channel, W/m^2.
 pub fn gather(
     walker: &mut Walker,
-    mesh: &Mesh,
-    occluders: &Occluders,
+    stage: Stage,
     values: &[DVec3],
     point: DVec3,
     normal: DVec3,
 ) -> DVec3 {
-    let nodes = mesh.basis.nodes();
+    let nodes = stage.mesh.basis.nodes();
     let mut sum = DVec3::ZERO;
-    walker.row(mesh, occluders, point, normal, |element, c| {
+    walker.row(stage, point, normal, |element, c| {
         let begin = element as usize * nodes;
         for (value, c) in values[begin..begin + nodes].iter().zip(c) {
             sum += c * *value;

@@ -59,8 +59,11 @@ fn representable(pixel: [f32; 3]) -> [f32; 3] {
     if exponent < LEAST_EXPONENT {
         return [0.0; 3];
     }
-    let level = f64::from(exponent - 8).exp2();
-    // A mantissa rounded up to 256 is 128 with the next exponent: a representable value too.
+    let mut level = f64::from(exponent - 8).exp2();
+    // A mantissa rounded up to 256 is 128 with the next exponent, whose levels hold for all three.
+    if (largest / level).round() == 256.0 {
+        level *= 2.0;
+    }
     pixel.map(|c| ((c / level).round() * level) as f32)
 }
 
@@ -75,6 +78,8 @@ mod tests {
         assert_eq!(representable([0.75, 0.6 / 256.0, 0.4 / 256.0]), [0.75, 1.0 / 256.0, 0.0]);
         // Rounding up to the next power of two.
         assert_eq!(representable([0.999, 0.0, 0.0]), [1.0, 0.0, 0.0]);
+        // The other channels then have the coarser levels as well, here of 1/128.
+        assert_eq!(representable([0.999, 3.2 / 256.0, 0.9 / 256.0]), [1.0, 2.0 / 128.0, 0.0]);
     }
 
     #[test]

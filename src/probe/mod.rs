@@ -17,7 +17,7 @@ const ON_SURFACE: f64 = 1e-6;
 
 /// Irradiance (W/m^2) at each point and normal, and radiosity of the surface there.
 ///
-/// A point that lies on a surface but for [`ON_SURFACE`], and behind it, is moved onto it: its own
+/// A point that lies on a surface but for `ON_SURFACE`, and behind it, is moved onto it: its own
 /// surface does not shade it. Radiosity is E + rho H with the surface's own normal.
 pub fn probe(
     scene: &Scene,

@@ -55,7 +55,9 @@ pub fn render(
     let rows: Vec<Vec<[f32; 3]>> = (0..options.height)
         .into_par_iter()
         .map_init(Walker::default, |walker, y| {
-            let row = (0..options.width).map(|x| painter.pixel(walker, x, y)).collect();
+            // Asked at every pixel: a wide row of gathered samples takes minutes.
+            let pixel = |x| monitor.check().map(|()| painter.pixel(walker, x, y));
+            let row = (0..options.width).map(pixel).collect::<Result<_>>()?;
             stage.advance(1)?;
             Ok(row)
         })

@@ -6,11 +6,11 @@
 //! average is its value at the centroid, exactly.
 //!
 //! With textures the footprint is bisected along its longest edge, measured in texels, until every
-//! part is at most one texel long; each part is integrated by the three-point rule of degree 2,
-//! which is exact where the (bi)linear texture and the vertex colours have a product of that
-//! degree. A footprint that would need more than [`PARTS`] parts reads a coarser level of the
+//! part is at most one texel long (half a texel where that is cheap); each part is integrated by
+//! the three-point rule of degree 2, which is exact where the texture times the vertex colours is
+//! of that degree. A footprint that would need more than [`PARTS`] parts reads a coarser level of the
 //! texture's pyramid, whose texels are exact averages: what is lost is only at the footprint's
-//! rim, of a width of about 1/30 of its size. For a product of two textures more parts are
+//! rim, of a width of about 1/40 of its size. For a product of two textures more parts are
 //! allowed, since averages of each would lose how they go together. Texels that are squares of one
 //! colour (`nearest`) are resolved to an eighth of a texel.
 //!
@@ -25,12 +25,16 @@ use super::texture::{Texture, Wrap};
 use super::{Scene, TextureUse, Triangle};
 
 /// About how many parts a footprint is cut into at most, for one texture.
-const PARTS: f64 = 2048.0;
+const PARTS: f64 = 4096.0;
 
 /// About how many for a product of two textures.
 const PARTS_OF_PRODUCT: f64 = 32_768.0;
 
-/// Parts to an edge of a texel that is a square of one colour.
+/// Parts to an edge of a texel, where there are few enough texels: the interpolation has kinks at
+/// the lines between texel centres, which the rule does not know of.
+const SMOOTH: f64 = 2.0;
+
+/// The same for a texel that is a square of one colour.
 const SHARP: f64 = 8.0;
 
 /// Mean reflectance, in [0, [`MAX_REFLECTANCE`]], of the part of a triangle whose corners are
@@ -47,9 +51,9 @@ pub fn reflectance(scene: &Scene, triangle: usize, footprint: &[DVec3; 3]) -> DV
         let c = &triangle.colour;
         if white { DVec3::ONE } else { c[0] * b.x + c[1] * b.y + c[2] * b.z }
     };
-    let base = Layer::of(scene, triangle, &material.reflectance_texture, footprint);
-    let metal = Layer::of(scene, triangle, &material.metallic_texture, footprint)
-        .filter(|_| material.metallic != 0.0);
+    let base = Layer::of(scene, triangle, &material.reflectance_texture);
+    let metal =
+        Layer::of(scene, triangle, &material.metallic_texture).filter(|_| material.metallic != 0.0);
     let mean = match (base, metal) {
         (None, None) => colour(centroid(footprint)) * (1.0 - material.metallic),
         (Some(base), None) => {
@@ -78,7 +82,7 @@ pub fn exitance(scene: &Scene, triangle: usize, footprint: &[DVec3; 3]) -> DVec3
     if material.radiance == DVec3::ZERO {
         return DVec3::ZERO;
     }
-    let factor = match Layer::of(scene, triangle, &material.radiance_texture, footprint) {
+    let factor = match Layer::of(scene, triangle, &material.radiance_texture) {
         None => DVec3::ONE,
         Some(layer) => average([layer], footprint, |_, [value]| value),
     };
@@ -104,23 +108,12 @@ struct Layer<'a> {
 
 impl<'a> Layer<'a> {
     /// The layer, or none if there is no texture.
-    fn of(
-        scene: &'a Scene,
-        triangle: &Triangle,
-        used: &Option<TextureUse>,
-        footprint: &[DVec3; 3],
-    ) -> Option<Self> {
+    fn of(scene: &'a Scene, triangle: &Triangle, used: &Option<TextureUse>) -> Option<Self> {
         let used = used.as_ref()?;
         let texture = scene.textures.get(used.texture)?;
         let uv = triangle.uv.get(used.set)?.map(|uv| used.apply(uv));
         let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
-        let mut layer =
-            Layer { texture, uv, wrap: used.wrap, nearest: used.nearest, level: 0, density: size };
-        // Squares of one colour only where they are larger than the footprint's parts.
-        if layer.nearest && layer.parts(footprint) * SHARP * SHARP <= PARTS {
-            layer.density *= SHARP;
-        }
-        Some(layer)
+        Some(Layer { texture, uv, wrap: used.wrap, nearest: used.nearest, level: 0, density: size })
     }
 
     fn at(&self, b: DVec3) -> DVec2 {
@@ -144,9 +137,13 @@ impl<'a> Layer<'a> {
         4.0 * area + 2.0 * edge
     }
 
-    /// Goes to coarser levels until the footprint has at most so many parts. Beyond the last
-    /// level, of one texel, only the parts go on growing.
-    fn coarsen(&mut self, footprint: &[DVec3; 3], most: f64) {
+    /// Goes to finer parts, or to coarser levels, until the footprint has at most so many parts.
+    /// Beyond the last level, of one texel, only the parts go on growing.
+    fn settle(&mut self, footprint: &[DVec3; 3], most: f64) {
+        let finer = if self.nearest { SHARP } else { SMOOTH };
+        if self.parts(footprint) * finer * finer <= most {
+            self.density *= finer;
+        }
         while self.parts(footprint) > most {
             self.level += 1;
             self.density *= 0.5;
@@ -168,7 +165,7 @@ fn average<const N: usize>(
             // Coordinates so large that differences overflow hold no position in the image.
             layer.uv = [DVec2::ZERO; 3];
         }
-        layer.coarsen(footprint, most);
+        layer.settle(footprint, most);
     }
     let length_squared =
         |step: DVec3| layers.iter().map(|l| l.length_squared(step)).fold(0.0, f64::max);

@@ -1,13 +1,13 @@
 //! A camera for scenes that have none.
 //!
-//! The rule: of a fixed list of views, take the one that sees the greatest share of the scene's
-//! radiating surface from its front, plus a quarter of the share that it sees of the light sources
-//! (which tells the inside of a two-sided room from its outside). The list holds views from outside (towards the middle of the
-//! bounding box from its corners and faces, far enough to see the whole box) and from inside (from
-//! near its corners and faces towards the middle). A room whose faces look inward is black from
-//! outside and so gets a view from inside; an open box is seen through its opening; an object on
-//! its own is seen from outside. Of views that are equally good, within a thousandth, the first in
-//! the list wins.
+//! The rule: of a fixed list of views, take the one with the greatest sum of three shares: of the
+//! scene's radiating surface that it sees from the front, of the objects that it sees (which tells
+//! the inside of a house from its walls outside), and, counted a quarter, of the light sources
+//! (which tell the inside of a two-sided room). The list holds views from outside (towards the
+//! middle of the bounding box from its corners and faces, far enough to see the whole box) and from
+//! inside (from near its corners and faces towards the middle). So a room whose faces look inward,
+//! black from outside, is seen from inside; an open box through its opening; an object on its own
+//! from outside. Of views that are equally good, within a thousandth, the first in the list wins.
 //!
 //! What a view sees is drawn into a small depth buffer. A pixel at distance r whose surface is
 //! inclined by theta covers omega r^2 / cos(theta) of it, omega being its solid angle; a triangle
@@ -148,13 +148,18 @@ fn score(scene: &Scene, camera: &Camera) -> f64 {
     seen.sort_by_key(|&(i, _)| i);
     let emits = |i: usize| scene.emits(scene.triangles[i].material as usize);
     let (mut all, mut lamps) = (0.0, 0.0);
+    let mut objects = vec![false; scene.objects.len()];
     for group in seen.chunk_by(|a, b| a.0 == b.0) {
         let triangle = group[0].0;
         let (_, whole) = scene.triangles[triangle].normal_and_area();
         let area = group.iter().map(|&(_, area)| area).sum::<f64>().min(whole);
         all += area;
         lamps += if emits(triangle) { area } else { 0.0 };
+        if let Some(seen) = objects.get_mut(scene.triangles[triangle].object as usize) {
+            *seen = true;
+        }
     }
+    let objects_seen = objects.iter().filter(|&&seen| seen).count();
     let (mut whole, mut whole_lamps) = (0.0, 0.0);
     for (i, triangle) in scene.triangles.iter().enumerate() {
         let (_, area) = triangle.normal_and_area();
@@ -162,7 +167,9 @@ fn score(scene: &Scene, camera: &Camera) -> f64 {
         whole_lamps += if emits(i) { area } else { 0.0 };
     }
     let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
-    share(all, whole) + LAMPS * share(lamps, whole_lamps)
+    share(all, whole)
+        + share(objects_seen as f64, objects.len() as f64)
+        + LAMPS * share(lamps, whole_lamps)
 }
 
 /// A perspective view with the half sizes of its picture at distance 1.

@@ -12,7 +12,7 @@ use image::{DynamicImage, ImageFormat, ImageReader};
 use super::limits::{MAX_IMAGE_SIDE, MAX_IMAGE_TEXELS};
 
 /// A decoded image.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Texture {
     /// Its name or file name in the scene file.
     pub name: String,

@@ -58,7 +58,9 @@ pub fn solve(
         });
     };
     let (radiosity, residual, iterations) = gmres(&reflect, exitance, options, monitor)?;
-    if !(residual.max_element() <= options.residual) {
+    // What is not a number has not converged either.
+    let converged = residual.max_element() <= options.residual;
+    if !converged {
         return Err(Error::NotConverged {
             residual: residual.max_element(),
             iterations,

@@ -174,14 +174,15 @@ fn merge(triangles: &[[DVec3; 3]], tolerance: f64) -> Vec<Merged> {
         .filter(|((corners, _), _)| !corners.is_empty())
         .map(|((corners, mut members), frame)| {
             members.sort_unstable();
-            let corners = corners.iter().map(|&i| points[i as usize]).collect();
+            let turning = corners_of(&corners, &points, &frame, tolerance).unwrap_or(corners);
+            let corners = turning.iter().map(|&i| points[i as usize]).collect();
             Merged { corners, normal: frame.n, members }
         })
         .collect()
 }
 
 /// The union of two convex loops over their common edge a -> b (b -> a in the second), if convex.
-/// Corners at which it runs straight on are left out.
+/// Points at which it runs straight on stay: a neighbour may begin there.
 fn join(
     p: &[u32],
     q: &[u32],
@@ -200,6 +201,29 @@ fn join(
     // b ... a around p, then what follows a in q up to before b.
     let mut loop_ids: Vec<u32> = (0..p.len()).map(|k| p[(ib + k) % p.len()]).collect();
     loop_ids.extend((1..q.len() - 1).map(|k| q[(ja + k) % q.len()]));
+    // Where the loops had more than this edge in common, the path goes out and back: cut it off.
+    while let Some(k) = (0..loop_ids.len()).find(|&k| {
+        let n = loop_ids.len();
+        loop_ids[(k + n - 1) % n] == loop_ids[(k + 1) % n]
+    }) {
+        let n = loop_ids.len();
+        if n < 5 {
+            return None;
+        }
+        // The tip, and one of the two equal points beside it.
+        let drop = [k, (k + 1) % n];
+        loop_ids = (0..n).filter(|i| !drop.contains(i)).map(|i| loop_ids[i]).collect();
+    }
+    corners_of(&loop_ids, points, frame, tolerance).map(|_| loop_ids)
+}
+
+/// The corners at which a loop turns, if it never turns right by more than `tolerance` allows.
+fn corners_of(
+    loop_ids: &[u32],
+    points: &[DVec3],
+    frame: &Frame,
+    tolerance: f64,
+) -> Option<Vec<u32>> {
     let n = loop_ids.len();
     let place: Vec<_> = loop_ids.iter().map(|&i| frame.project(points[i as usize])).collect();
     let mut kept = vec![];

@@ -12,6 +12,12 @@ use crate::geometry::{Bounds, Frame};
 /// shaded by it. Flat faces whose corners were rounded to f32 are flat by this measure.
 const FLAT: f64 = 2e-6;
 
+/// Most that the plane through the observer and an occluder's edge is taken to be turned by the
+/// roundings of the edge's ends, radians. Edges shorter than COINCIDENCE / TURN, 2e-6 of the
+/// scene's size, turn by more, but what is coplanar with so short an edge matters less than what
+/// its line would sweep over: areas beyond 1e-9 of the distance squared would go to the wrong side.
+const TURN: f64 = 1e-9;
+
 /// A point that looks out over a plane.
 #[derive(Clone, Copy)]
 pub struct Observer<'a> {
@@ -25,7 +31,7 @@ pub struct Observer<'a> {
 
 impl Observer<'_> {
     /// Whether light between this point and a source plane with normal `n` is negligible however
-    /// they lie: both face the same way but for [`FLAT`].
+    /// they lie: both face the same way but for `FLAT`.
     pub fn faces_away(&self, n: DVec3) -> bool {
         self.normal.distance_squared(n) <= FLAT * FLAT
     }
@@ -168,11 +174,15 @@ impl Shadows {
             uncertainty,
         };
         for (i, &w) in corners.iter().enumerate() {
-            let (a, b) = (w - point, corners[(i + 1) % corners.len()] - point);
-            // What a shift of all four points by tau does to the volume a x b . (x - P).
-            let (la, lb) = (a.length(), b.length());
-            let uncertainty = tau * (la * lb + (la + lb) * reach);
-            self.lines.push(line(side * a.cross(b), point, uncertainty));
+            // a x edge is a x b, without the cancellation for short edges.
+            let (a, edge) = (w - point, corners[(i + 1) % corners.len()] - w);
+            let normal = side * a.cross(edge);
+            // What shifts of P, x and the edge by tau do to the volume a x edge . (x - P), and what
+            // shifts of the edge's ends by tau against each other do.
+            let shifted = edge.length() * (a.length() + reach);
+            let turned = 2.0 * (a.length() + edge.length()) * reach;
+            let uncertainty = tau * shifted + (tau * turned).min(TURN * normal.length() * reach);
+            self.lines.push(line(normal, point, uncertainty));
         }
         self.lines.push(line(side * n, on_plane, tau));
         let d = frame.height(point);

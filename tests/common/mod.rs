@@ -2,7 +2,10 @@
 #![allow(dead_code)]
 
 use glam::{DMat3, DVec2, DVec3};
+use lumel::cluster::Clusters;
 use lumel::mesh::{Basis, Mesh, MeshOptions, Refinement};
+use lumel::monitor::Monitor;
+use lumel::operator::{Operator, OperatorKind, Stage};
 use lumel::scene::{Material, Object, Scene, Triangle};
 use lumel::visibility::Occluders;
 
@@ -100,11 +103,27 @@ pub fn rotated(scene: &Scene, turn: DMat3, scale: f64, shift: DVec3) -> Scene {
     moved
 }
 
-pub fn mesh_of(scene: &Scene, basis: Basis, refinement: Refinement) -> Mesh {
-    lumel::mesh::build(scene, &MeshOptions { basis, refinement }).unwrap()
+/// A scene made ready for looking at.
+pub struct Prepared {
+    pub mesh: Mesh,
+    pub clusters: Clusters,
+    pub occluders: Occluders,
 }
 
-pub fn occluders_of(scene: &Scene) -> Occluders {
-    let triangles: Vec<_> = scene.triangles.iter().map(|t| t.vertices).collect();
-    Occluders::build(&triangles)
+impl Prepared {
+    pub fn new(scene: &Scene, basis: Basis, refinement: Refinement) -> Prepared {
+        let mesh = lumel::mesh::build(scene, &MeshOptions { basis, refinement }).unwrap();
+        let triangles: Vec<_> = scene.triangles.iter().map(|t| t.vertices).collect();
+        let clusters = Clusters::build(&mesh);
+        Prepared { mesh, clusters, occluders: Occluders::build(&triangles) }
+    }
+
+    pub fn stage(&self) -> Stage<'_> {
+        Stage { mesh: &self.mesh, clusters: &self.clusters, occluders: &self.occluders }
+    }
+}
+
+/// The exact operator of a prepared scene.
+pub fn exact_of(prepared: &Prepared) -> Operator<'_> {
+    Operator::build(prepared.stage(), OperatorKind::Exact, u64::MAX, &Monitor::silent()).unwrap()
 }

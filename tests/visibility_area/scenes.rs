@@ -1,0 +1,211 @@
+//! Seeded scenes of one source triangle, one observer and many blockers.
+
+use glam::{DMat3, DVec3};
+
+/// SplitMix64 (Steele, Lea & Flood 2014): every test scene follows from one number.
+pub struct Random(u64);
+
+impl Random {
+    /// The sequence of a seed.
+    pub fn new(seed: u64) -> Random {
+        Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x5DEE_CE66_D1CE_4E5B)
+    }
+
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 * 2f64.powi(-53)
+    }
+
+    /// Uniform in [low, high).
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Uniform in 0..n.
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.unit() * n as f64) as usize
+    }
+
+    /// Uniform in a cube of half width `half`.
+    pub fn point(&mut self, half: f64) -> DVec3 {
+        DVec3::new(self.within(-half, half), self.within(-half, half), self.within(-half, half))
+    }
+
+    /// Uniform on the sphere.
+    pub fn direction(&mut self) -> DVec3 {
+        loop {
+            let x = self.point(1.0);
+            if (0.01..1.0).contains(&x.length_squared()) {
+                return x.normalize();
+            }
+        }
+    }
+
+    /// A rotation by any angle about any axis.
+    pub fn turn(&mut self) -> DMat3 {
+        let angle = self.within(0.0, std::f64::consts::TAU);
+        DMat3::from_axis_angle(self.direction(), angle)
+    }
+}
+
+/// A point that looks at one side of a triangle past others.
+#[derive(Clone, Debug)]
+pub struct Sight {
+    /// The triangle that is looked at; the side that its winding shows.
+    pub source: [DVec3; 3],
+    /// The observer.
+    pub point: DVec3,
+    /// Its unit normal.
+    pub normal: DVec3,
+    /// Everything that blocks; may contain the source and the observer's own surface.
+    pub blockers: Vec<[DVec3; 3]>,
+}
+
+impl Sight {
+    /// The scene turned, then scaled, then shifted.
+    pub fn moved(&self, turn: DMat3, scale: f64, shift: DVec3) -> Sight {
+        let place = |x: DVec3| scale * (turn * x) + shift;
+        Sight {
+            source: self.source.map(place),
+            point: place(self.point),
+            normal: (turn * self.normal).normalize(),
+            blockers: self.blockers.iter().map(|t| t.map(place)).collect(),
+        }
+    }
+
+    /// Height of the observer above the source plane over the source's size.
+    fn rises(&self) -> f64 {
+        let [a, b, c] = self.source;
+        let n = (b - a).cross(c - a);
+        (self.point - a).dot(n) / n.length_squared().powf(0.75)
+    }
+}
+
+fn quad([a, b, c, d]: [DVec3; 4]) -> [[DVec3; 3]; 2] {
+    [[a, b, c], [a, c, d]]
+}
+
+/// A scene of real numbers: triangles, parallelograms, polygons cut into fans and folded sheets
+/// between the observer and the source, some through the source plane or beyond it.
+pub fn random_sight(seed: u64) -> Sight {
+    let mut r = Random::new(seed);
+    loop {
+        let source = [r.point(1.0), r.point(1.0), r.point(1.0)];
+        let (point, centre) = (r.point(1.5), (source[0] + source[1] + source[2]) / 3.0);
+        let normal = ((centre - point).normalize() + 0.9 * r.direction()).normalize();
+        let mut sight = Sight { source, point, normal, blockers: vec![] };
+        let n = (source[1] - source[0]).cross(source[2] - source[0]);
+        if !(sight.rises() > 0.02 && n.length() > 0.05) {
+            continue;
+        }
+        let count = 1 + r.below(12);
+        for _ in 0..count {
+            let along = r.within(-0.1, 1.2);
+            let middle = point.lerp(centre, along) + r.point(0.4);
+            let size = r.within(0.1, 1.0);
+            let (u, v) = (size * r.direction(), size * r.direction());
+            match r.below(4) {
+                0 => sight.blockers.push([middle + u, middle + v, middle + size * r.direction()]),
+                1 => sight.blockers.extend(quad([middle, middle + u, middle + u + v, middle + v])),
+                2 => sight.blockers.extend(fan(middle, u, v, 3 + r.below(6), r.below(2) == 1)),
+                _ => sight.blockers.extend(sheet(&mut r, middle, u, v)),
+            }
+        }
+        sight.blockers.push(source);
+        return sight;
+    }
+}
+
+/// A convex polygon (an affine image of a regular one) as triangles about its middle, or as
+/// triangles about a corner.
+fn fan(middle: DVec3, u: DVec3, v: DVec3, corners: usize, inner: bool) -> Vec<[DVec3; 3]> {
+    let rim = |k: usize| {
+        let (s, c) = (std::f64::consts::TAU * (k % corners) as f64 / corners as f64).sin_cos();
+        middle + c * u + s * v
+    };
+    if inner {
+        (0..corners).map(|k| [middle, rim(k), rim(k + 1)]).collect()
+    } else {
+        (1..corners - 1).map(|k| [rim(0), rim(k), rim(k + 1)]).collect()
+    }
+}
+
+/// Two by two quads with common corners, flat or folded at random.
+fn sheet(r: &mut Random, middle: DVec3, u: DVec3, v: DVec3) -> Vec<[DVec3; 3]> {
+    let fold = [0.0, 0.3][r.below(2)] * u.length();
+    let mut corner =
+        |i: i32, j: i32| middle + f64::from(i - 1) * u + f64::from(j - 1) * v + r.point(1.0) * fold;
+    let grid: Vec<DVec3> = (0..9).map(|k| corner(k % 3, k / 3)).collect();
+    [0, 1, 3, 4]
+        .into_iter()
+        .flat_map(|k: usize| quad([grid[k], grid[k + 1], grid[k + 4], grid[k + 3]]))
+        .collect()
+}
+
+/// A scene on the grid {0..4}^3: everything touches, coincides and is in one plane all the time.
+pub fn grid_sight(seed: u64) -> Sight {
+    let mut r = Random::new(seed);
+    let top = 1 + r.below(4);
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    loop {
+        let mut corner = || {
+            DVec3::new(r.below(top + 1) as f64, r.below(top + 1) as f64, r.below(top + 1) as f64)
+        };
+        let source = [corner(), corner(), corner()];
+        let mut point = corner();
+        let third = corner();
+        match r.below(3) {
+            0 => {}
+            1 => point += 0.5 * axes[r.below(3)],
+            // A point inside a triangle of the grid, such as a node is.
+            _ => point = (point + third + source[0]) / 3.0,
+        }
+        let normal = match r.below(3) {
+            0 => r.direction(),
+            k => axes[r.below(3)] * if k == 1 { 1.0 } else { -1.0 },
+        };
+        let mut sight = Sight { source, point, normal, blockers: vec![] };
+        let rises = sight.rises();
+        if !(rises.is_finite() && rises > 1e-3) {
+            continue;
+        }
+        let most = if r.below(4) == 0 { 30 } else { 6 };
+        let count = 1 + r.below(most);
+        while sight.blockers.len() < count {
+            let mut corner = || {
+                DVec3::new(
+                    r.below(top + 1) as f64,
+                    r.below(top + 1) as f64,
+                    r.below(top + 1) as f64,
+                )
+            };
+            let (a, b, c) = (corner(), corner(), corner());
+            if (b - a).cross(c - a) == DVec3::ZERO {
+                continue;
+            }
+            match r.below(5) {
+                0 => sight.blockers.extend(quad([a, b, b + c - a, c])),
+                1 => sight.blockers.extend([[a, b, c], [a, c, b]]),
+                // An edge or a corner of the source itself.
+                2 if (c - source[0]).cross(source[1] - source[0]) != DVec3::ZERO => {
+                    sight.blockers.push([source[0], source[1], c]);
+                }
+                _ => sight.blockers.push([a, b, c]),
+            }
+        }
+        match r.below(3) {
+            0 => sight.blockers.push(source),
+            1 => sight.blockers.push([source[0], source[2], source[1]]),
+            _ => {}
+        }
+        return sight;
+    }
+}
