@@ -92,6 +92,12 @@ impl Session {
         let light =
             self.clock.time("solve", || light::light(scene, &settings.light_options(), monitor))?;
         let report = &mut self.report;
+        let contacts = light.mesh.contacts;
+        report.count("faces cut at contacts", contacts.cut);
+        report.count("segments of contacts", contacts.segments);
+        report.count("faces cut at longer contacts only", contacts.simplified);
+        report.count("faces with contacts left whole", contacts.left_whole);
+        report.count("roots", light.mesh.roots.len());
         report.count("elements", light.mesh.elements());
         report.count("nodes", light.mesh.nodes());
         report.count("occluders", light.occluders.len());

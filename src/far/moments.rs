@@ -12,7 +12,8 @@ use crate::mesh::{ALPHA, Basis, Mesh};
 ///
 /// Layout: `values[(cluster * count(order) + index)]`, index as in [`super::expand`].
 pub struct ClusterMoments<const C: usize> {
-    order: usize,
+    /// Order m of the polynomials.
+    pub order: usize,
     values: Vec<[f64; C]>,
 }
 
@@ -22,10 +23,10 @@ impl<const C: usize> ClusterMoments<C> {
         ClusterMoments { order, values: vec![[0.0; C]; clusters.len() * count(order)] }
     }
 
-    /// The moments of one cluster.
-    pub fn of(&self, cluster: u32) -> &[[f64; C]] {
+    /// The moments of `many` clusters from number `first` on.
+    pub fn of(&self, first: u32, many: u32) -> &[[f64; C]] {
         let n = count(self.order);
-        &self.values[cluster as usize * n..][..n]
+        &self.values[first as usize * n..][..many as usize * n]
     }
 
     /// Computes all moments of the piecewise polynomial with node values `u`: elements first, then

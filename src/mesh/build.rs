@@ -1,11 +1,11 @@
 //! From a scene's triangles to faces, roots and elements.
 
-use std::collections::HashMap;
+use glam::DVec2;
 
-use glam::{DVec2, DVec3};
-
+use super::pieces::Cut;
 use super::refine::{Refinement, child, edge_for_count, level_for};
-use super::{Basis, Face, Mesh, Root};
+use super::seams::{self, Joins};
+use super::{Basis, Face, Mesh, Root, contacts};
 use crate::error::{Error, Result};
 use crate::geometry::{Bounds, Frame};
 use crate::scene::Scene;
@@ -40,18 +40,23 @@ pub fn build(scene: &Scene, options: &MeshOptions) -> Result<Mesh> {
             faces.push(Face { triangle: index as u32, back, frame, corners, roots, surface: 0 });
         }
     }
-    join_surfaces(scene, &mut faces);
-    let mut roots: Vec<Root> = faces
-        .iter()
-        .enumerate()
-        .map(|(i, f)| Root {
-            face: i as u32,
-            corners: f.corners,
-            level: 0,
-            first: 0,
-            patch: f.surface,
-        })
-        .collect();
+    let joins = Joins::find(scene, &mut faces);
+    let mut front = vec![None; scene.triangles.len()];
+    for (i, face) in faces.iter().enumerate().filter(|(_, f)| !f.back) {
+        front[face.triangle as usize] = Some(i as u32);
+    }
+    let (cuts, contacts) = contacts::find(scene, &faces, &front, &joins);
+    let mut roots = vec![];
+    for i in 0..faces.len() {
+        let triangle = faces[i].triangle as usize;
+        let its_front = front[triangle].map_or(i, |f| f as usize);
+        let corners = root_corners(&faces[i], &faces[its_front].frame, cuts[triangle].as_ref());
+        let begin = roots.len() as u32;
+        faces[i].roots = (begin, begin + corners.len() as u32);
+        let root = |corners| Root { face: i as u32, corners, level: 0, first: 0, patch: 0 };
+        roots.extend(corners.into_iter().map(root));
+    }
+    let seams = seams::find(&faces, &mut roots, &cuts, &joins);
     choose_levels(&mut roots, options.refinement);
     let bounds =
         scene.triangles.iter().fold(Bounds::EMPTY, |b, t| b.union(Bounds::of(&t.vertices)));
@@ -61,11 +66,27 @@ pub fn build(scene: &Scene, options: &MeshOptions) -> Result<Mesh> {
         basis: options.basis,
         faces,
         roots,
+        seams,
+        contacts,
         element_root,
         element_corners,
         bounds,
         magnitude,
     })
+}
+
+/// Corners of the roots of a face whose triangle was cut as `cut` says, in coordinates of the
+/// triangle's front, a plane with frame `front`.
+fn root_corners(face: &Face, front: &Frame, cut: Option<&Cut>) -> Vec<[DVec2; 3]> {
+    let Some(cut) = cut else { return vec![face.corners] };
+    let corner = |i: u32| match (i, face.back) {
+        (0..3, false) => face.corners[i as usize],
+        (0..3, true) => face.corners[(3 - i as usize) % 3],
+        (_, false) => cut.points[i as usize],
+        (_, true) => face.frame.project(front.lift(cut.points[i as usize])),
+    };
+    let order = |p: &[u32; 3]| if face.back { [p[0], p[2], p[1]] } else { *p };
+    cut.pieces.iter().map(|p| order(p).map(corner)).collect()
 }
 
 fn longest_edge(t: &[DVec2; 3]) -> f64 {
@@ -108,48 +129,4 @@ fn elements(roots: &mut [Root]) -> Result<(Vec<u32>, Vec<[DVec2; 3]>)> {
         element_root.resize(element_corners.len(), index as u32);
     }
     Ok((element_root, element_corners))
-}
-
-/// Normals that differ by at most this (radians) belong to one smooth surface: flat surfaces whose
-/// corners were rounded to f32 stay one; creases are never joined across.
-const SMOOTH: f64 = 1e-5;
-
-/// Numbers the smooth surfaces: faces joined by whole edges, with the same normal.
-fn join_surfaces(scene: &Scene, faces: &mut [Face]) {
-    let key = |x: DVec3| (x + 0.0).to_array().map(f64::to_bits);
-    let corners = |face: &Face| {
-        let [a, b, c] = scene.triangles[face.triangle as usize].vertices.map(key);
-        if face.back { [a, c, b] } else { [a, b, c] }
-    };
-    let mut sides: HashMap<_, Vec<u32>> = HashMap::new();
-    for (i, face) in faces.iter().enumerate() {
-        let c = corners(face);
-        for k in 0..3 {
-            sides.entry((c[k], c[(k + 1) % 3])).or_default().push(i as u32);
-        }
-    }
-    let mut owner: Vec<u32> = (0..faces.len() as u32).collect();
-    for i in 0..faces.len() {
-        let c = corners(&faces[i]);
-        for k in 0..3 {
-            for &j in sides.get(&(c[(k + 1) % 3], c[k])).into_iter().flatten() {
-                if faces[i].frame.n.distance(faces[j as usize].frame.n) <= SMOOTH {
-                    let (p, q) = (find(&mut owner, i as u32), find(&mut owner, j));
-                    owner[p.max(q) as usize] = p.min(q);
-                }
-            }
-        }
-    }
-    for i in 0..faces.len() {
-        faces[i].surface = find(&mut owner, i as u32);
-    }
-}
-
-/// Representative of `i` in a union-find forest, with path halving.
-fn find(owner: &mut [u32], mut i: u32) -> u32 {
-    while owner[i as usize] != i {
-        owner[i as usize] = owner[owner[i as usize] as usize];
-        i = owner[i as usize];
-    }
-    i
 }

@@ -6,8 +6,12 @@
 //! finest triangles in the order of its quadtree, so each subtree is a range of elements.
 
 mod appearance;
+mod arrangement;
 mod build;
+mod contacts;
+mod pieces;
 mod refine;
+mod seams;
 
 use glam::{DVec2, DVec3};
 
@@ -15,7 +19,9 @@ use crate::geometry::{Bounds, Frame};
 
 pub use appearance::{appearance, face_weights};
 pub use build::{MeshOptions, build};
+pub use contacts::{CONTACT, Contacts};
 pub use refine::{DEEPEST, Refinement, child, level_for};
+pub use seams::{Seam, Side};
 
 /// Position of the interior nodes of linear elements, AC (2.5); 0 < alpha < 1/3.
 pub const ALPHA: f64 = 1.0 / 6.0;
@@ -78,7 +84,7 @@ pub struct Face {
     pub corners: [DVec2; 3],
     /// Its roots: `roots.0..roots.1`.
     pub roots: (u32, u32),
-    /// Index of its smooth surface: coplanar faces joined by edges.
+    /// Index of its smooth surface: coplanar faces joined by edges, contacts or not.
     pub surface: u32,
 }
 
@@ -93,7 +99,7 @@ pub struct Root {
     pub level: u32,
     /// Its first element.
     pub first: u32,
-    /// Smooth patch that it belongs to: what values may be averaged over.
+    /// Smooth patch that it belongs to: roots connected by [`Mesh::seams`].
     pub patch: u32,
 }
 
@@ -105,6 +111,10 @@ pub struct Mesh {
     pub faces: Vec<Face>,
     /// Parts of faces.
     pub roots: Vec<Root>,
+    /// Where values may be averaged across the edges of roots, in order.
+    pub seams: Vec<Seam>,
+    /// What was cut where faces touch.
+    pub contacts: Contacts,
     /// Root of each element.
     pub element_root: Vec<u32>,
     /// Corners of each element in its face's plane.

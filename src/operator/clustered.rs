@@ -89,24 +89,59 @@ pub struct ClusteredOperator<'a> {
     pub sizes: FieldSizes,
 }
 
+/// Far clusters, face by face.
+///
+/// The walk meets the clusters of a level in the order of their numbers, so that most of them
+/// continue a run: what is stored is the first of a run and how many there are.
+#[derive(Default)]
+struct FarList {
+    /// A face, and the end of its runs.
+    faces: Vec<(u32, u32)>,
+    /// First cluster, and how many.
+    runs: Vec<(u32, u32)>,
+}
+
+impl FarList {
+    fn clear(&mut self) {
+        self.faces.clear();
+        self.runs.clear();
+    }
+
+    /// Adds a cluster of `face`; faces before number `row` of the list belong to other rows.
+    fn push(&mut self, row: usize, face: u32, cluster: u32) {
+        let same_face = self.faces[row..].last().is_some_and(|last| last.0 == face);
+        match self.runs.last_mut() {
+            Some(run) if same_face && run.0 + run.1 == cluster => run.1 += 1,
+            _ => self.runs.push((cluster, 1)),
+        }
+        let end = self.runs.len() as u32;
+        match self.faces.last_mut() {
+            Some(last) if same_face => last.1 = end,
+            _ => self.faces.push((face, end)),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        size_of::<(u32, u32)>() * (self.faces.len() + self.runs.len())
+    }
+}
+
 /// Lists of consecutive rows.
 #[derive(Default)]
 struct Chunk {
-    /// For each row the ends of its runs and of its exact entries.
+    /// For each row the ends of its faces with far clusters and of its exact entries.
     rows: Vec<(u32, u32)>,
-    /// Far clusters of one face: the face, and the end of its clusters in `far`.
-    runs: Vec<(u32, u32)>,
-    far: Vec<u32>,
+    far: FarList,
     elements: Vec<u32>,
     coefficients: Vec<f64>,
     counts: Counts,
     sizes: FieldSizes,
 }
 
-/// Numbers of far clusters and exact elements of an average node, from at most 256 sampled nodes.
+/// What an average node needs, from at most 256 sampled nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldForecast {
-    /// Far clusters a node.
+    /// Bytes of the list of far clusters of a node.
     pub far: f64,
     /// Near and gray elements a node.
     pub exact: f64,
@@ -118,7 +153,7 @@ impl FieldForecast {
     /// Bytes of what `kept` keeps.
     pub fn bytes(&self, kept: Kept) -> u64 {
         let far = match kept {
-            Kept::All => self.far * size_of::<u32>() as f64,
+            Kept::All => self.far,
             Kept::Exact => 0.0,
         };
         (self.nodes * (far + self.exact * self.per_exact)) as u64
@@ -135,8 +170,13 @@ pub fn forecast(stage: Stage, eta: f64) -> FieldForecast {
         .map_init(Walker::default, |walker, &node| {
             walker.counts = Counts::default();
             let (point, normal) = stage.mesh.node(node);
-            walker.cover(stage, point, normal, eta, |_, _| {});
-            (walker.counts.far, walker.counts.near + walker.counts.gray)
+            let mut list = FarList::default();
+            walker.cover(stage, point, normal, eta, |scope, seen| {
+                if let Seen::Far(cluster) = seen {
+                    list.push(0, scope.index, cluster);
+                }
+            });
+            (list.bytes() as u64, walker.counts.near + walker.counts.gray)
         })
         .collect();
     let mean = |f: fn(&(u64, u64)) -> u64| {
@@ -226,8 +266,7 @@ impl<'a> ClusteredOperator<'a> {
     /// Bytes stored.
     pub fn bytes(&self) -> usize {
         let of = |c: &Chunk| {
-            8 * (c.rows.len() + c.runs.len() + c.coefficients.len())
-                + 4 * (c.far.len() + c.elements.len())
+            c.far.bytes() + 8 * (c.rows.len() + c.coefficients.len()) + 4 * c.elements.len()
         };
         self.chunks.iter().map(of).sum()
     }
@@ -251,41 +290,35 @@ impl<'a> ClusteredOperator<'a> {
         let mut moments = ClusterMoments::<C>::new(clusters, order);
         moments.compute(mesh, clusters, u);
         let moments = &moments;
-        let add_far = |view: &View, cluster: u32, sum: &mut [f64; C]| {
-            let centre = clusters.centre[cluster as usize];
-            far_sum(order, view, centre, moments.of(cluster), sum);
-        };
         let n = mesh.basis.nodes();
         self.chunks.par_iter().zip(out.par_chunks_mut(ROWS_PER_TASK)).enumerate().for_each_init(
-            Walker::default,
-            |walker, (index, (chunk, out))| {
-                let (mut run, mut far, mut entry) = (0, 0, 0);
-                for (k, (out, &(runs_end, entries_end))) in
-                    out.iter_mut().zip(&chunk.rows).enumerate()
-                {
+            <(Walker, FarList)>::default,
+            |(walker, found), (index, (chunk, out))| {
+                let (mut face, mut run, mut entry) = (0, 0, 0);
+                let rows = out.iter_mut().zip(&chunk.rows).enumerate();
+                for (k, (out, &(faces_end, entries_end))) in rows {
                     let (point, normal) = mesh.node(index * ROWS_PER_TASK + k);
-                    let mut sum = [0.0; C];
-                    match self.kept {
-                        Kept::All => {
-                            for &(face, far_end) in &chunk.runs[run..runs_end as usize] {
-                                let frame = &mesh.faces[face as usize].frame;
-                                let view = View::new(frame, point, normal);
-                                for &cluster in &chunk.far[far..far_end as usize] {
-                                    add_far(&view, cluster, &mut sum);
-                                }
-                                far = far_end as usize;
-                            }
-                            run = runs_end as usize;
-                        }
+                    let (list, range) = match self.kept {
+                        Kept::All => (&chunk.far, face..faces_end as usize),
                         Kept::Exact => {
+                            found.clear();
+                            run = 0;
                             let eta = self.options.eta;
                             walker.cover(self.stage, point, normal, eta, |scope, seen| {
                                 if let Seen::Far(cluster) = seen {
-                                    add_far(&scope.view, cluster, &mut sum);
+                                    found.push(0, scope.index, cluster);
                                 }
                             });
+                            (&*found, 0..found.faces.len())
                         }
+                    };
+                    let mut sum = [0.0; C];
+                    for &(number, end) in &list.faces[range] {
+                        let runs = &list.runs[run..end as usize];
+                        add_far(self.stage, moments, number, runs, (point, normal), &mut sum);
+                        run = end as usize;
                     }
+                    face = faces_end as usize;
                     let end = entries_end as usize;
                     let coefficients = chunk.coefficients[entry * n..end * n].chunks_exact(n);
                     for (&element, c) in chunk.elements[entry..end].iter().zip(coefficients) {
@@ -300,6 +333,22 @@ impl<'a> ClusteredOperator<'a> {
                 }
             },
         );
+    }
+}
+
+/// Adds the far field of runs of clusters of one face, as a point with a normal sees them.
+fn add_far<const C: usize>(
+    stage: Stage,
+    moments: &ClusterMoments<C>,
+    face: u32,
+    runs: &[(u32, u32)],
+    (point, normal): (DVec3, DVec3),
+    sum: &mut [f64; C],
+) {
+    let view = View::new(&stage.mesh.faces[face as usize].frame, point, normal);
+    for &(first, many) in runs {
+        let centres = &stage.clusters.centre[first as usize..][..many as usize];
+        far_sum(moments.order, &view, centres, moments.of(first, many), sum);
     }
 }
 
@@ -322,13 +371,12 @@ impl ClusteredSource {
     /// Irradiance H = 1/pi int u G V at a point with the given unit normal: exact from near and
     /// gray elements, by Taylor polynomials from far clusters.
     pub fn gather(&self, walker: &mut Walker, stage: Stage, point: DVec3, normal: DVec3) -> DVec3 {
-        let (basis, order) = (stage.mesh.basis, self.options.order);
-        let mut clip = Pieces::default();
+        let basis = stage.mesh.basis;
+        let (mut clip, mut far) = (Pieces::default(), FarList::default());
         let mut sum = [0.0; 3];
         walker.cover(stage, point, normal, self.options.eta, |scope, seen| {
             if let Seen::Far(cluster) = seen {
-                let centre = stage.clusters.centre[cluster as usize];
-                far_sum(order, &scope.view, centre, self.moments.of(cluster), &mut sum);
+                far.push(0, scope.index, cluster);
             } else if let Some((element, c)) = exact_entry(scope, seen, basis, &mut clip) {
                 let values = &self.values[element as usize * basis.nodes()..];
                 for (c, value) in c.iter().zip(&values[..basis.nodes()]) {
@@ -338,6 +386,12 @@ impl ClusteredSource {
                 }
             }
         });
+        let mut run = 0;
+        for &(face, end) in &far.faces {
+            let runs = &far.runs[run..end as usize];
+            add_far(stage, &self.moments, face, runs, (point, normal), &mut sum);
+            run = end as usize;
+        }
         DVec3::from_array(sum) / std::f64::consts::PI
     }
 }
@@ -355,29 +409,23 @@ fn chunk(
     for node in rows {
         walker.counts = Counts::default();
         let (point, normal) = stage.mesh.node(node);
-        let first_run = chunk.runs.len();
+        let row = chunk.far.faces.len();
         walker.cover(stage, point, normal, eta, |scope: &Scope, seen| {
             if let Seen::Far(cluster) = seen {
                 if kept == Kept::All {
-                    let last = chunk.runs[first_run..].last();
-                    if last.is_none_or(|&(face, _)| face != scope.index) {
-                        chunk.runs.push((scope.index, 0));
-                    }
-                    chunk.far.push(cluster);
-                    if let Some(run) = chunk.runs.last_mut() {
-                        run.1 = chunk.far.len() as u32;
-                    }
+                    chunk.far.push(row, scope.index, cluster);
                 }
             } else if let Some((element, c)) = exact_entry(scope, seen, basis, clip) {
                 chunk.elements.push(element);
                 chunk.coefficients.extend_from_slice(&c[..basis.nodes()]);
             }
         });
-        chunk.rows.push((chunk.runs.len() as u32, chunk.elements.len() as u32));
+        chunk.rows.push((chunk.far.faces.len() as u32, chunk.elements.len() as u32));
         chunk.counts += walker.counts;
         chunk.sizes = chunk.sizes.or_larger(sizes_of(&walker.counts));
     }
-    chunk.far.shrink_to_fit();
+    chunk.far.faces.shrink_to_fit();
+    chunk.far.runs.shrink_to_fit();
     chunk.elements.shrink_to_fit();
     chunk.coefficients.shrink_to_fit();
     chunk

@@ -127,22 +127,45 @@ fn area(contour: &[IntPoint<i64>]) -> f64 {
     0.5 * twice as f64
 }
 
-/// The most by which roundings and snapping may change the visible area, square metres.
+/// Whether every height that decides something is either meant to be zero or clearly not zero.
+pub fn decidable(sight: &Sight) -> bool {
+    let clear = |height: f64| height.abs() < 0.01 * ON || height.abs() > 10.0 * ON;
+    let (on, up) = plane(&sight.source);
+    (sight.point - on).dot(up) > 10.0 * ON
+        && sight.blockers.iter().all(|triangle| {
+            let (corner, n) = plane(triangle);
+            clear((sight.point - corner).dot(n))
+                && triangle.iter().all(|&x| clear((x - on).dot(up)))
+        })
+}
+
+fn plane(&[a, b, c]: &[DVec3; 3]) -> (DVec3, DVec3) {
+    (a, (b - a).cross(c - a).normalize())
+}
+
+/// The most by which the library's visible area may differ from the oracle's, square metres.
 ///
-/// The library treats values of the linear function N.(x - P), N = a x b, of the edge between
-/// a = w1 - P and b = w2 - P as zero when a shift of w1, w2, P and x by tau could make them zero:
-/// up to tau (|a||b| + (|a| + |b|) R), R the largest distance from P to the source. On the source
-/// plane that is a strip of half width w = that / |g| along the line, g the part of N in the
-/// plane. What is given to the wrong side of the line lies in its strip, so its area is at most
-/// w D a side, D the source's longest edge. The scene given may differ from the exact one by
-/// another tau a coordinate (the transform's roundings): once more the same. The occluder's plane
-/// and the horizon are lines as well, with tau for the uncertainty.
+/// The library treats values of the linear function N.(x - P), N = a x e, of the edge e that
+/// begins at P + a as zero when shifts by tau could make them zero: up to tau |e| (|a| + R) for
+/// shifts of x, P and the edge, R the largest distance from P to the source, and, for shifts of the
+/// edge's ends against each other, 2 tau (|a| + |e|) R, but at most 1e-9 |N| R. On the source plane
+/// that is a strip of half width w = their sum over |g| along the line, g the part of N in the
+/// plane. What is given to the wrong side of a line lies in its strip, so its area is at most
+/// 2 w D, D the source's longest edge. The scene given may differ from the exact one by another
+/// tau a coordinate (the transform's roundings): once more the same. The occluder's plane and the
+/// horizon are lines as well, with tau for the uncertainty.
 ///
 /// Blockers that do not rise above the source plane, or whose plane holds the observer, cut
-/// nothing.
+/// nothing. Those within 2e-6 radians of the observer's own surface may be left out: what they
+/// shade is as near its horizon.
+///
+/// The oracle divides by the observer's height d above the source plane, which has lost
+/// magnitude/d: sixteen roundings of that in its area.
 pub fn allowance(sight: &Sight) -> f64 {
+    const FLAT: f64 = 2e-6;
+    const TURN: f64 = 1e-9;
     let [a, b, c] = sight.source;
-    let n = (b - a).cross(c - a).normalize();
+    let (_, n) = plane(&sight.source);
     let everything = || sight.blockers.iter().chain([&sight.source]).flatten();
     let magnitude = everything().map(|x| x.abs().max_element()).fold(0.0, f64::max);
     let tau = 16.0 * (f64::EPSILON / 2.0) * magnitude;
@@ -151,18 +174,24 @@ pub fn allowance(sight: &Sight) -> f64 {
     let in_plane = |x: DVec3| (x - x.dot(n) * n).length();
     let mut width = tau / in_plane(sight.normal);
     for triangle in &sight.blockers {
-        let normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalize();
-        if (sight.point - triangle[0]).dot(normal).abs() <= tau
+        let (corner, normal) = plane(triangle);
+        if (sight.point - corner).dot(normal).abs() <= tau
             || triangle.iter().all(|&x| (x - a).dot(n) <= tau)
         {
             continue;
         }
         width += (tau / in_plane(normal)).min(longest);
+        if normal.cross(sight.normal).length() <= FLAT {
+            width += 2.0 * FLAT * reach / in_plane(sight.normal);
+        }
         for k in 0..3 {
-            let (p, q) = (triangle[k] - sight.point, triangle[(k + 1) % 3] - sight.point);
-            let uncertain = tau * (p.length() * q.length() + (p.length() + q.length()) * reach);
-            width += (uncertain / in_plane(p.cross(q))).min(longest);
+            let (a, e) = (triangle[k] - sight.point, triangle[(k + 1) % 3] - triangle[k]);
+            let turned = 2.0 * tau * (a.length() + e.length()) * reach;
+            let uncertain = tau * e.length() * (a.length() + reach)
+                + turned.min(TURN * a.cross(e).length() * reach);
+            width += (uncertain / in_plane(a.cross(e))).min(longest);
         }
     }
-    2.0 * 2.0 * width * longest
+    let d = (sight.point - a).dot(n);
+    2.0 * 2.0 * width * longest + tau / d * longest * longest
 }

@@ -209,3 +209,46 @@ pub fn grid_sight(seed: u64) -> Sight {
         return sight;
     }
 }
+
+/// A scene with many things that almost coincide: corners, or the observer, moved by 1e-3 to 1e-9.
+pub fn nearly_coincident_sight(seed: u64) -> Sight {
+    let mut r = Random::new(!seed);
+    let mut sight = if r.below(3) == 0 { random_sight(seed) } else { grid_sight(seed) };
+    let shift = 10f64.powf(-r.within(3.0, 9.0));
+    if r.below(3) == 0 {
+        let t = sight.blockers[r.below(sight.blockers.len())];
+        let (s, t, x) = (r.within(0.0, 0.5), r.within(0.0, 0.5), t);
+        sight.point = x[0] + s * (x[1] - x[0]) + t * (x[2] - x[0]) + shift * r.direction();
+    } else {
+        for x in sight.blockers.iter_mut().flatten() {
+            if r.below(3) == 0 {
+                *x += shift * r.direction();
+            }
+        }
+    }
+    sight
+}
+
+/// A random scene whose blockers have corners cut off, and needles split off, 1e-4 to 1e-11 long.
+pub fn short_edged_sight(seed: u64) -> Sight {
+    let mut r = Random::new(!seed);
+    let mut sight = random_sight(seed);
+    let short = 10f64.powf(-r.within(4.0, 11.0));
+    sight.blockers = sight
+        .blockers
+        .iter()
+        .flat_map(|&[a, b, c]| match r.below(3) {
+            0 => {
+                let p = a + short * r.within(0.5, 1.0) * (b - a);
+                let q = a + short * r.within(0.5, 1.0) * (c - a);
+                vec![[p, b, c], [p, c, q]]
+            }
+            1 => {
+                let p = b + short * (c - b);
+                vec![[a, b, p], [a, p, c]]
+            }
+            _ => vec![[a, b, c]],
+        })
+        .collect();
+    sight
+}
