@@ -68,7 +68,7 @@ const LANES: usize = 4;
 /// Adds d sum kappa_ij M_ij to `sum`, for C channels and for clusters of one plane that follow each
 /// other: their centres, and their moments (count(order) each).
 ///
-/// Clusters are taken [`LANES`] at a time, with the recurrence of [`expand`] in each lane; the sum
+/// Clusters are taken `LANES` at a time, with the recurrence of [`expand`] in each lane; the sum
 /// runs in a fixed order, cluster by cluster within a coefficient.
 pub fn far_sum<const C: usize>(
     order: usize,

@@ -8,7 +8,9 @@
 //! corner on the edge of another), a vertex *hangs* on the longer edge. Along that edge the
 //! irradiance is taken piecewise linear through the hanging vertices, and in the element
 //!
-//!     H(x) = 3 w_k H_c + (1 - 3 w_k) H_edge(x'),   w_k the least weight of x,
+//! ```text
+//! H(x) = 3 w_k H_c + (1 - 3 w_k) H_edge(x'),   w_k the least weight of x,
+//! ```
 //!
 //! with H_c the mean of the corners and x' where the ray from the centroid through x leaves over
 //! the edge opposite corner k: linear on the fan of triangles between the centroid and the

@@ -23,9 +23,7 @@ const ON: f64 = 1e-12;
 pub struct Areas {
     /// Of the source.
     pub source: f64,
-    /// Of its part above the observer's horizon.
-    pub risen: f64,
-    /// Of what is seen of that.
+    /// Of what the observer sees of it.
     pub visible: f64,
 }
 
@@ -54,7 +52,6 @@ pub fn areas(sight: &Sight) -> Areas {
     let mut overlay = Overlay::<i64>::new(64);
     let subject: Vec<_> = risen.iter().map(|&p| whole(DVec2::from(p))).collect();
     overlay.add_contour(&subject, ShapeType::Subject);
-    let risen = area(&subject) / (unit * unit);
     for triangle in &sight.blockers {
         let normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalize();
         if (sight.point - triangle[0]).dot(normal).abs() <= ON {
@@ -75,15 +72,17 @@ pub fn areas(sight: &Sight) -> Areas {
         let low = middle - half - foot;
         let high = middle + half - foot;
         // h >= 0, then the four sides of the box; each as a linear function of the three.
-        let sides: [&dyn Fn(&[f64; 3]) -> f64; 5] = [
-            &|p| d - p[2],
-            &|p| p[0] - low.x * p[2],
-            &|p| p[1] - low.y * p[2],
-            &|p| high.x * p[2] - p[0],
-            &|p| high.y * p[2] - p[1],
-        ];
-        let shadow = sides.iter().fold(corners, |polygon, side| {
-            cut(&polygon.iter().map(|p| (*p, side(p))).collect::<Vec<_>>())
+        let sides = |p: &[f64; 3]| {
+            [
+                d - p[2],
+                p[0] - low.x * p[2],
+                p[1] - low.y * p[2],
+                high.x * p[2] - p[0],
+                high.y * p[2] - p[1],
+            ]
+        };
+        let shadow = (0..5).fold(corners, |polygon, side| {
+            cut(&polygon.iter().map(|p| (*p, sides(p)[side])).collect::<Vec<_>>())
         });
         if shadow.len() < 3 {
             continue;
@@ -97,7 +96,7 @@ pub fn areas(sight: &Sight) -> Areas {
     }
     let shapes = overlay.overlay(OverlayRule::Difference, FillRule::NonZero);
     let visible: f64 = shapes.iter().flatten().map(|c| area(c)).sum::<f64>() / (unit * unit);
-    Areas { source: 0.5 * (source[1] - source[0]).perp_dot(source[2] - source[0]), risen, visible }
+    Areas { source: 0.5 * (source[1] - source[0]).perp_dot(source[2] - source[0]), visible }
 }
 
 /// The part of a convex polygon with values >= 0, corners given with their values.

@@ -48,7 +48,7 @@ pub fn line(sight: &Sight, x: DVec3) -> Line {
         if from.abs().min(to.abs()) > slack && from * to < 0.0 && least > MARGIN {
             return Line::Blocked;
         }
-        if !(least < -MARGIN) {
+        if least.is_nan() || least >= -MARGIN {
             answer = Line::Grazing;
         }
     }
