@@ -225,4 +225,40 @@ mod tests {
         let area = integrate(&triangle, 1.0, &|_| 1.0);
         assert!((area - 7.0).abs() < 1e-13, "{area}");
     }
+
+    #[test]
+    fn the_emissivity_does_not_depend_on_the_panels() {
+        // The same integral over the whole of [0, 2B]^2 and over parts with other corners, and so
+        // with other slabs and panels, seen from the places on S2, S4 and S5 that are worst.
+        let floor = Frame::new(DVec3::ZERO, DVec3::Z);
+        let p = |x: f64, y: f64| DVec2::new(x, y);
+        let whole = [p(0.0, 0.0), p(4.0, 0.0), p(4.0, 4.0), p(0.0, 4.0)];
+        let hub = p(1.37, 2.71);
+        let triangles = (0..4).map(|k| vec![hub, whole[k], whole[(k + 1) % 4]]).collect::<Vec<_>>();
+        let rectangles = (0..4).map(|k| {
+            let (low, high) = (hub.min(whole[k]), hub.max(whole[k]));
+            vec![low, p(high.x, low.y), high, p(low.x, high.y)]
+        });
+        let rectangles = rectangles.collect::<Vec<_>>();
+        let places = [
+            (DVec3::new(1.99, 1.99, 1.0), DVec3::NEG_Z),
+            (DVec3::new(0.01, 0.99, 2.0), DVec3::NEG_Z),
+            (DVec3::new(3.9, 5.0, 0.01), DVec3::NEG_Y),
+        ];
+        for (point, normal) in places {
+            let view = View::new(&floor, point, normal);
+            for beta in [1.0, 0.5, 2.0] {
+                let solution = Solution::Kinked { beta, gamma: 1.5 };
+                let f = |x: DVec2| solution.at(0, floor.lift(x)) * view.g(x);
+                let once = integrate(&whole, beta, &f);
+                let sum = |parts: &[Vec<DVec2>]| -> f64 {
+                    parts.iter().map(|part| integrate(part, beta, &f)).sum()
+                };
+                // Shadows of the plate cut rectangles; slanted sides are only for whole powers.
+                let other = if beta.fract() == 0.0 { sum(&triangles) } else { sum(&rectangles) };
+                assert!((once - other).abs() < 1e-13, "{point} {beta}: {once} {other}");
+                assert!((once - sum(&rectangles)).abs() < 1e-13, "{point} {beta}");
+            }
+        }
+    }
 }
