@@ -181,7 +181,7 @@ fn interrupted(options: &str) {
         .current_dir(room.path())
         .arg("render")
         .arg(shipped("cornell.gltf"))
-        .args(["-o", "old.png"])
+        .args(["-o", "old.png", "--threads", "1"])
         .args(options.split_whitespace())
         .stderr(Stdio::piped())
         .spawn()
@@ -203,7 +203,7 @@ fn interrupted(options: &str) {
 #[cfg(unix)]
 #[test]
 fn an_interruption_ends_the_building_of_rows() {
-    interrupted("--basis constant --subdivide 4");
+    interrupted("--basis constant --max-edge 0.045");
 }
 
 #[cfg(unix)]

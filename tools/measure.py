@@ -66,17 +66,17 @@ def irradiances(directory, points, *words):
 def refinement(directory):
     """Irradiance on the floor of the Cornell box against the finest mesh."""
     points = lattice(directory)
-    finest, _, _ = irradiances(directory, points, "--subdivide", 4)
+    finest, _, _ = irradiances(directory, points, "--max-edge", 0.05)
     size = sum(v * v for v in finest) ** 0.5
     print("| settings | elements | CPU s | RMS error | largest error |")
     print("|---|---|---|---|---|")
     mean = size / len(finest) ** 0.5
     for words in (
-        ("--subdivide", 1),
-        ("--subdivide", 2),
-        ("--subdivide", 3),
-        ("--subdivide", 3, "--basis", "constant"),
-        ("--subdivide", 3, "--operator", "clustered"),
+        ("--max-edge", 0.3),
+        ("--max-edge", 0.2),
+        ("--max-edge", 0.1),
+        ("--max-edge", 0.1, "--basis", "constant"),
+        ("--max-edge", 0.1, "--operator", "clustered"),
     ):
         values, report, cpu = irradiances(directory, points, *words)
         errors = [abs(a - b) for a, b in zip(values, finest)]
