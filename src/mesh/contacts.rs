@@ -10,7 +10,8 @@
 //!
 //! Heights over the plane of at most the contact tolerance count as zero. The segments are clipped
 //! to T, snapped and cut at their crossings ([`super::arrangement`]), and T is triangulated with
-//! them as constraints ([`super::pieces`]).
+//! them as constraints ([`super::pieces`]), large ones with more points for the sake of its shape
+//! ([`super::shape`]).
 //!
 //! A segment along the boundary of T cuts nothing. Where a flat neighbour continues T there (the
 //! diagonal of a quad under a wall), the segment severs the two, so that no values are averaged
@@ -27,6 +28,7 @@ use super::Face;
 use super::arrangement::arrange;
 use super::pieces::{Cut, cut_along};
 use super::seams::Joins;
+use super::shape::improve;
 use crate::geometry::{Bounds, BoxTree, Frame};
 use crate::scene::Scene;
 
@@ -52,7 +54,7 @@ const PARALLEL: f64 = 1e-4;
 
 /// Triangles longer than this share of the scene are cut into well-shaped pieces: they will be
 /// refined and seen. Small ones become few elements whatever their shape.
-const LARGE: f64 = 1.0 / 8.0;
+const LARGE: f64 = 1.0 / 6.0;
 
 /// Most segments of one triangle that are tried: far more than may be left once they are snapped.
 const MOST_SEGMENTS: usize = 1000;
@@ -136,7 +138,10 @@ impl Finder<'_> {
                 return None;
             }
             let arrangement = arrange(corners, &segments, self.tolerance)?;
-            let cut = cut_along(&arrangement, self.tolerance, shapely)?;
+            let mut cut = cut_along(arrangement, self.tolerance)?;
+            if shapely && cut.pieces.len() > 1 {
+                improve(&mut cut);
+            }
             counts.simplified = usize::from(*share > 0.0);
             Some(cut)
         });

@@ -12,6 +12,7 @@ mod contacts;
 mod pieces;
 mod refine;
 mod seams;
+mod shape;
 
 use glam::{DVec2, DVec3};
 

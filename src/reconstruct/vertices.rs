@@ -185,7 +185,7 @@ impl Joining {
         // Places on both, in shares of the first edge; the second runs against it.
         let (start, end) = ((its_to - from).dot(along), (its_from - from).dot(along));
         let (step, its_step) = (1.0 / f64::from(n), (end - start) / f64::from(its_n));
-        if !(its_step > 0.0) {
+        if its_step <= 0.0 || its_step.is_nan() {
             return;
         }
         let same = SAME * step.min(its_step);
@@ -193,8 +193,10 @@ impl Joining {
         while i <= n || j <= its_n {
             let s = f64::from(i) * step;
             let t = start + f64::from(j) * its_step;
-            let (mine, its) =
-                (self.on_edge(sides[0], i, n), self.on_edge(sides[1], its_n - j, its_n));
+            let (mine, its) = (
+                self.on_edge(sides[0], i, n),
+                self.on_edge(sides[1], its_n.saturating_sub(j), its_n),
+            );
             if i <= n && j <= its_n && (s - t).abs() <= same {
                 self.unite(mine, its);
                 (i, j) = (i + 1, j + 1);
