@@ -7,6 +7,7 @@
 //! | `printed` | what the paper prints |
 //! | `tables` | the runs, side by side with that |
 //! | `fit` | growth exponents by least squares |
+#![doc = include_str!("tables.md")]
 
 pub mod fit;
 pub mod manufactured;

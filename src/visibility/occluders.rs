@@ -41,7 +41,7 @@ impl Occluders {
         let mut boxes = vec![];
         for polygon in merged {
             boxes.push(Bounds::of(&polygon.corners));
-            occluders.planes.push((polygon.corners[0], polygon.normal));
+            occluders.planes.push(polygon.plane);
             occluders.corners.extend(polygon.corners);
             occluders.ends.push(occluders.corners.len());
             occluders.members.extend(polygon.members);
@@ -86,12 +86,12 @@ impl Occluders {
 
 struct Merged {
     corners: Vec<DVec3>,
-    normal: DVec3,
+    plane: (DVec3, DVec3),
     members: Vec<u32>,
 }
 
-/// Joins coplanar neighbours into convex polygons. Corners farther than `tolerance` from a plane
-/// are not on it.
+/// Joins coplanar neighbours into convex polygons: those all of whose points one plane holds to half
+/// of `tolerance`.
 fn merge(triangles: &[[DVec3; 3]], tolerance: f64) -> Vec<Merged> {
     let key = |x: DVec3| (x + 0.0).to_array().map(f64::to_bits);
     let mut ids = HashMap::new();
@@ -151,15 +151,17 @@ fn merge(triangles: &[[DVec3; 3]], tolerance: f64) -> Vec<Merged> {
         if p == q {
             continue;
         }
-        let coplanar = loops[q]
-            .iter()
-            .all(|&x| frames[p].height(points[x as usize]).abs() <= tolerance)
-            && loops[p].iter().all(|&x| frames[q].height(points[x as usize]).abs() <= tolerance)
-            && frames[p].n.dot(frames[q].n) > 0.0;
-        if !coplanar {
+        // Roundings tilt the planes of triangles wider than 1e-12 of the scene by less than 1e-3.
+        if frames[p].n.distance(frames[q].n) > 1e-3 {
             continue;
         }
-        if let Some(joined) = join(&loops[p], &loops[q], a, b, &points, &frames[p], tolerance) {
+        let Some(joined) = join(&loops[p], &loops[q], a, b, &points, &frames[p], tolerance) else {
+            continue;
+        };
+        // One half of the tolerance for the corners, one for what is compared with them.
+        let Some(frame) = widest_frame(&joined, &points, frames[p].n) else { continue };
+        if joined.iter().all(|&x| frame.height(points[x as usize]).abs() <= 0.5 * tolerance) {
+            frames[p] = frame;
             loops[p] = joined;
             loops[q] = vec![];
             let moved = std::mem::take(&mut members[q]);
@@ -176,9 +178,24 @@ fn merge(triangles: &[[DVec3; 3]], tolerance: f64) -> Vec<Merged> {
             members.sort_unstable();
             let turning = corners_of(&corners, &points, &frame, tolerance).unwrap_or(corners);
             let corners = turning.iter().map(|&i| points[i as usize]).collect();
-            Merged { corners, normal: frame.n, members }
+            Merged { corners, plane: (frame.origin, frame.n), members }
         })
         .collect()
+}
+
+/// The plane of a flat convex loop, with a normal on the side of `n`: through three points far
+/// apart, so that it is not tilted as the plane of one thin triangle of many may be.
+fn widest_frame(loop_ids: &[u32], points: &[DVec3], n: DVec3) -> Option<Frame> {
+    let place = |&i: &u32| points[i as usize];
+    let farthest = |size: &dyn Fn(DVec3) -> f64| {
+        loop_ids.iter().map(place).max_by(|&x, &y| size(x).total_cmp(&size(y)))
+    };
+    let first = place(loop_ids.first()?);
+    let a = farthest(&|x| x.distance_squared(first))?;
+    let b = farthest(&|x| x.distance_squared(a))?;
+    let c = farthest(&|x| (x - a).cross(b - a).length_squared())?;
+    let frame = Frame::of_triangle(&[a, b, c])?;
+    if frame.n.dot(n) > 0.0 { Some(frame) } else { Frame::of_triangle(&[a, c, b]) }
 }
 
 /// The union of two convex loops over their common edge a -> b (b -> a in the second), if convex.

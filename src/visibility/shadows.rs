@@ -246,8 +246,14 @@ impl Shadows {
                 self.inside.clear();
                 self.inside.push(piece);
                 let mut shaded = true;
-                for f in lines {
+                for (k, f) in lines.iter().enumerate() {
                     let rest = self.inside.get(0);
+                    // What lies in the occluder's plane, the last line, it does not shade. A thin
+                    // occluder's plane is known where the occluder is: here, between its edges.
+                    if k + 1 == lines.len() && f.nowhere_positive(rest) {
+                        shaded = false;
+                        break;
+                    }
                     if f.nowhere_negative(rest) {
                         continue;
                     }

@@ -71,18 +71,17 @@ pub fn areas(sight: &Sight) -> Areas {
             .collect();
         let low = middle - half - foot;
         let high = middle + half - foot;
-        // h >= 0, then the four sides of the box; each as a linear function of the three.
-        let sides = |p: &[f64; 3]| {
-            [
-                d - p[2],
-                p[0] - low.x * p[2],
-                p[1] - low.y * p[2],
-                high.x * p[2] - p[0],
-                high.y * p[2] - p[1],
-            ]
-        };
-        let shadow = (0..5).fold(corners, |polygon, side| {
-            cut(&polygon.iter().map(|p| (*p, sides(p)[side])).collect::<Vec<_>>())
+        // h >= 0, then the four sides of the box: each a linear function of the three.
+        let sides = [
+            [0.0, 0.0, -1.0, d],
+            [1.0, 0.0, -low.x, 0.0],
+            [0.0, 1.0, -low.y, 0.0],
+            [-1.0, 0.0, high.x, 0.0],
+            [0.0, -1.0, high.y, 0.0],
+        ];
+        let shadow = sides.iter().fold(corners, |polygon, [x, y, w, one]| {
+            let value = |p: &[f64; 3]| x * p[0] + y * p[1] + w * p[2] + one;
+            cut(&polygon.iter().map(|p| (*p, value(p))).collect::<Vec<_>>())
         });
         if shadow.len() < 3 {
             continue;
