@@ -2,6 +2,8 @@
 
 mod common;
 
+use std::path::Path;
+
 use common::{Prepared, box_room, exact_of, rotated, scene_of};
 use glam::{DMat3, DVec3};
 use lumel::mesh::{Basis, Refinement};
@@ -42,6 +44,17 @@ fn a_box_with_blocks_inside_is_closed() {
         );
         let sums = row_sums(&turned, basis, 1);
         assert!(worst(&sums) < 1e-10, "{:e}", worst(&sums));
+    }
+}
+
+#[test]
+fn closed_shipped_scenes_are_closed() {
+    for name in ["room.gltf", "furnace.gltf"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+        let scene = lumel::scene::read(&path, &Default::default()).unwrap();
+        let prepared = Prepared::new(&scene, Basis::Linear, Refinement::Elements(1000));
+        let sums = exact_of(&prepared).row_sums(prepared.mesh.nodes());
+        assert!(worst(&sums) < 1e-9, "{name}: {:e}", worst(&sums));
     }
 }
 

@@ -19,8 +19,9 @@ pub struct MeshOptions {
     pub refinement: Refinement,
 }
 
-/// Most elements a mesh may have: their numbers are 32 bits wide, and so are their nodes'.
-const MOST_ELEMENTS: f64 = 1.0e9;
+/// Most elements a mesh may have: about 4 GB with their clusters, and far more than any operator
+/// can take. A request for more is a mistake in units or levels, and refused before it allocates.
+const MOST_ELEMENTS: f64 = 5.0e7;
 
 /// Builds the mesh of a scene; elements come in the order of the scene's triangles, the back side
 /// of a two-sided triangle after its front.
