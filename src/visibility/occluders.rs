@@ -235,6 +235,9 @@ fn join(
 }
 
 /// The corners at which a loop turns, if it never turns right by more than `tolerance` allows.
+///
+/// Turns are those from the last corner kept: of many small turns, each of them nothing, none would
+/// be left.
 fn corners_of(
     loop_ids: &[u32],
     points: &[DVec3],
@@ -243,9 +246,14 @@ fn corners_of(
 ) -> Option<Vec<u32>> {
     let n = loop_ids.len();
     let place: Vec<_> = loop_ids.iter().map(|&i| frame.project(points[i as usize])).collect();
-    let mut kept = vec![];
-    for k in 0..n {
-        let (before, here, after) = (place[(k + n - 1) % n], place[k], place[(k + 1) % n]);
+    // What is farthest from any point is a corner.
+    let far = |k: &usize| place[*k].distance_squared(place[0]);
+    let start = (0..n).max_by(|a, b| far(a).total_cmp(&far(b)))?;
+    let mut kept = vec![loop_ids[start]];
+    let mut before = place[start];
+    for step in 1..n {
+        let k = (start + step) % n;
+        let (here, after) = (place[k], place[(k + 1) % n]);
         let (to, from) = (here - before, after - here);
         let turn = to.perp_dot(from);
         let noise = tolerance * (to.length() + from.length());
@@ -254,6 +262,7 @@ fn corners_of(
         }
         if turn > noise {
             kept.push(loop_ids[k]);
+            before = here;
         }
     }
     (kept.len() >= 3).then_some(kept)
@@ -291,5 +300,17 @@ mod tests {
         assert_eq!(Occluders::build(&l).len(), 1);
         l.extend([[p(0., 1.), p(0.5, 1.), p(0., 2.)]]);
         assert_eq!(Occluders::build(&l).len(), 2);
+    }
+
+    #[test]
+    fn a_bend_is_not_lost_in_a_short_edge() {
+        let p = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        let (bend, short) = (0.01f64, 1e-13);
+        let (a, b, c) = (p(0.0, 0.5), p(-1.0, 0.0), p(0.0, 0.0));
+        let (near, d) =
+            (short * p(bend.cos(), bend.sin()), p((2.0 * bend).cos(), (2.0 * bend).sin()));
+        let occluders = Occluders::build(&[[a, b, c], [a, c, near], [a, near, d]]);
+        assert_eq!(occluders.len(), 1);
+        assert_eq!(occluders.corners(0).len(), 4);
     }
 }
