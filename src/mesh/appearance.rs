@@ -1,9 +1,9 @@
 //! Reflectance and exitance at the collocation nodes.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Basis, Mesh, barycentric, child};
+use super::{Basis, Mesh, child};
 use crate::scene::{self, Scene};
 
 /// Reflectance rho and exitance E (W/m^2) at each collocation node, per channel.
@@ -23,7 +23,7 @@ pub fn appearance(scene: &Scene, mesh: &Mesh) -> (Vec<DVec3>, Vec<DVec3>) {
                 Basis::Linear => child(corners, 2 - k),
             };
             let face = mesh.face_of(element);
-            let footprint = part.map(|x| face_weights(mesh, element, x));
+            let footprint = part.map(|x| face.triangle_weights(x));
             let triangle = face.triangle as usize;
             (
                 scene::reflectance(scene, triangle, &footprint),
@@ -31,12 +31,4 @@ pub fn appearance(scene: &Scene, mesh: &Mesh) -> (Vec<DVec3>, Vec<DVec3>) {
             )
         })
         .unzip()
-}
-
-/// Barycentric weights of a plane point of an element's face in its input triangle.
-pub fn face_weights(mesh: &Mesh, element: usize, x: DVec2) -> DVec3 {
-    let face = mesh.face_of(element);
-    let w = barycentric(&face.corners, x);
-    // The back side has the triangle's corners in the order 1, 3, 2.
-    if face.back { DVec3::new(w.x, w.z, w.y) } else { w }
 }

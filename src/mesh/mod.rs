@@ -18,7 +18,7 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::{Bounds, Frame};
 
-pub use appearance::{appearance, face_weights};
+pub use appearance::appearance;
 pub use build::{MeshOptions, build};
 pub use contacts::{CONTACT, Contacts};
 pub use refine::{DEEPEST, Refinement, child, level_for};
@@ -87,6 +87,15 @@ pub struct Face {
     pub roots: (u32, u32),
     /// Index of its smooth surface: coplanar faces joined by edges, contacts or not.
     pub surface: u32,
+}
+
+impl Face {
+    /// Barycentric weights of the plane point `x` in the face's input triangle, whose corners the
+    /// back side has in the order 1, 3, 2.
+    pub fn triangle_weights(&self, x: DVec2) -> DVec3 {
+        let w = barycentric(&self.corners, x);
+        if self.back { DVec3::new(w.x, w.z, w.y) } else { w }
+    }
 }
 
 /// A part of a face that is refined uniformly.

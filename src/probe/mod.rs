@@ -1,10 +1,8 @@
 //! Values at points: irradiance gathered exactly there, radiosity of the surface there.
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::mesh::barycentric;
 use crate::monitor::Monitor;
 use crate::operator::walk::Walker;
 use crate::output::csv::{Point, ProbeResult};
@@ -45,8 +43,7 @@ pub fn probe(
             } else {
                 light.irradiance(walker, at, face.frame.n)
             };
-            let w = barycentric(&face.corners, foot.x);
-            let w = if face.back { DVec3::new(w.x, w.z, w.y) } else { w };
+            let w = face.triangle_weights(foot.x);
             let triangle = face.triangle as usize;
             let radiosity = scene::exitance(scene, triangle, &[w; 3])
                 + scene::reflectance(scene, triangle, &[w; 3]) * own;

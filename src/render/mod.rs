@@ -11,7 +11,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::mesh::{Face, barycentric};
+use crate::mesh::Face;
 use crate::monitor::Monitor;
 use crate::operator::walk::Walker;
 use crate::reconstruct::{Surface, VertexIrradiance};
@@ -156,8 +156,6 @@ fn footprint(face: &Face, ray: &Ray, place: DVec2) -> [DVec3; 3] {
     };
     let right = meet(ray.right.0, ray.right.1).map_or(DVec2::ZERO, |p| p - place);
     let down = meet(ray.down.0, ray.down.1).map_or(DVec2::ZERO, |p| p - place);
-    [-0.5 * right - 0.5 * down, right - 0.5 * down, down - 0.5 * right].map(|offset| {
-        let w = barycentric(&face.corners, place + offset);
-        if face.back { DVec3::new(w.x, w.z, w.y) } else { w }
-    })
+    [-0.5 * right - 0.5 * down, right - 0.5 * down, down - 0.5 * right]
+        .map(|offset| face.triangle_weights(place + offset))
 }
