@@ -8,9 +8,11 @@
 //!
 //! The moments are computed once for each u, exactly, and passed up the tree.
 
+pub mod interpolation;
 pub mod moments;
 pub mod taylor;
 
+pub use interpolation::Interpolation;
 pub use moments::ClusterMoments;
 pub use taylor::{count, expand, far_sum};
 

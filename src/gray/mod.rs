@@ -15,12 +15,13 @@ pub fn moments(
     horizon: &Linear,
     element: &[DVec2; 3],
     visible: &Pieces,
+    precision: f64,
     scratch: &mut Pieces,
 ) -> Moments {
     let centroid = (element[0] + element[1] + element[2]) / 3.0;
     let mut sum = Moments::default();
     for piece in visible.iter() {
-        sum += moments_above(view, piece, centroid, horizon, scratch);
+        sum += moments_above(view, piece, centroid, horizon, precision, scratch);
     }
     sum
 }

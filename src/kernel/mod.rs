@@ -84,15 +84,31 @@ impl std::ops::AddAssign for Moments {
 /// distance over radius, and one more in the first moment), and 12 x 12 Gauss points are exact.
 const CLOSED_FORM_ABOVE: f64 = 0.25;
 
+/// The precision of integrals that are as exact as the closed forms: see [`moments`].
+pub const EXACT: f64 = 0.0;
+
+/// Radius over distance above which Gauss rules are too long, at any precision.
+const GAUSS_BELOW: f64 = 0.7;
+
+/// Most points a direction for which a Gauss rule is faster than the closed form.
+const MOST_POINTS: usize = 12;
+
 /// Integrals over a convex polygon that lies above the receiver's horizon.
 ///
-/// Relative error 1e-12 in the zeroth moment; in the first moment 1e-12 of the zeroth times the
-/// polygon's radius.
-pub fn moments(view: &View, polygon: &[DVec2], about: DVec2) -> Moments {
+/// With precision [`EXACT`] the relative error is 1e-12 in the zeroth moment; in the first moment
+/// 1e-12 of the zeroth times the polygon's radius. Any other precision bounds the errors relative to
+/// area/distance^2 (and that times the radius).
+pub fn moments(view: &View, polygon: &[DVec2], about: DVec2, precision: f64) -> Moments {
     let centre = polygon.iter().sum::<DVec2>() / polygon.len() as f64;
     let radius = polygon.iter().map(|x| x.distance_squared(centre)).fold(0.0, f64::max).sqrt();
     let distance = (centre.distance_squared(view.foot) + view.d * view.d).sqrt();
     let ratio = radius / distance;
+    if precision > EXACT && ratio <= GAUSS_BELOW {
+        let points = quadrature::points_within(ratio, precision);
+        if points <= MOST_POINTS.min(quadrature::points_for(ratio)) {
+            return quadrature::moments(view, polygon, about, points);
+        }
+    }
     if ratio > CLOSED_FORM_ABOVE {
         closed_form::moments(view, polygon, about)
     } else {
@@ -106,14 +122,15 @@ pub fn moments_above(
     polygon: &[DVec2],
     about: DVec2,
     horizon: &Linear,
+    precision: f64,
     scratch: &mut Pieces,
 ) -> Moments {
     if horizon.nowhere_negative(polygon) {
-        return moments(view, polygon, about);
+        return moments(view, polygon, about, precision);
     }
     scratch.clear();
     if scratch.push_clipped(polygon, horizon) {
-        moments(view, scratch.get(0), about)
+        moments(view, scratch.get(0), about, precision)
     } else {
         Moments::default()
     }

@@ -12,10 +12,11 @@ pub fn moments(
     view: &View,
     horizon: &Linear,
     element: &[DVec2; 3],
+    precision: f64,
     scratch: &mut Pieces,
 ) -> Moments {
     let centroid = (element[0] + element[1] + element[2]) / 3.0;
-    moments_above(view, element, centroid, horizon, scratch)
+    moments_above(view, element, centroid, horizon, precision, scratch)
 }
 
 /// Turns moments of G V about an element's centroid into integrals of G V times its basis

@@ -5,6 +5,9 @@
 
 pub mod clustered;
 pub mod exact;
+pub mod fast;
+pub mod links;
+pub mod pairs;
 pub mod walk;
 
 use glam::DVec3;

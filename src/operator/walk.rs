@@ -12,7 +12,7 @@ use crate::cluster::{Clusters, admissible};
 use crate::geometry::Pieces;
 use crate::geometry::polygon::Linear;
 use crate::gray;
-use crate::kernel::{Moments, View};
+use crate::kernel::{EXACT, Moments, View};
 use crate::mesh::{Basis, Face, Mesh, child};
 use crate::near;
 use crate::visibility::{Coverage, Observer, Occluders, Shadows};
@@ -245,10 +245,10 @@ pub fn exact_entry(
     let (element, corners, moments) = match seen {
         Seen::Far(_) => return None,
         Seen::Near(e, corners) => {
-            (e, corners, near::moments(&scope.view, &scope.horizon, corners, clip))
+            (e, corners, near::moments(&scope.view, &scope.horizon, corners, EXACT, clip))
         }
         Seen::Gray(e, corners, pieces) => {
-            (e, corners, gray::moments(&scope.view, &scope.horizon, corners, pieces, clip))
+            (e, corners, gray::moments(&scope.view, &scope.horizon, corners, pieces, EXACT, clip))
         }
     };
     (moments != Moments::default()).then(|| (element, near::coefficients(moments, corners, basis)))

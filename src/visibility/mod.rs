@@ -8,6 +8,8 @@
 
 mod occluders;
 mod shadows;
+mod shaft;
 
 pub use occluders::Occluders;
-pub use shadows::{Coverage, Observer, Shadows};
+pub use shadows::{Coverage, Observer, Shadows, faces_away};
+pub use shaft::Shaft;

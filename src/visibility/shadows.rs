@@ -33,7 +33,7 @@ impl Observer<'_> {
     /// Whether light between this point and a source plane with normal `n` is negligible however
     /// they lie: both face the same way but for `FLAT`.
     pub fn faces_away(&self, n: DVec3) -> bool {
-        self.normal.distance_squared(n) <= FLAT * FLAT
+        faces_away(self.normal, n)
     }
 
     /// Whether the occluder blocks nothing that matters, seen from this point: the point is in its
@@ -44,12 +44,23 @@ impl Observer<'_> {
         if height.abs() <= tau {
             return true;
         }
-        let up = n * n.dot(self.normal).signum();
-        if (self.point - on_plane).dot(up) > 0.0 && self.faces_away(up) {
+        if continues_flat(self.normal, n, &[height]) {
             return true;
         }
         self.occluders.corners(index).iter().all(|&w| (w - self.point).dot(self.normal) <= tau)
     }
+}
+
+/// Whether light between planes with these unit normals is negligible however they lie.
+pub fn faces_away(receiver: DVec3, source: DVec3) -> bool {
+    receiver.distance_squared(source) <= FLAT * FLAT
+}
+
+/// Whether a plane with unit normal `n` continues the flat surface of receivers with unit `normal`
+/// that have these heights above it.
+pub(super) fn continues_flat(normal: DVec3, n: DVec3, heights: &[f64]) -> bool {
+    let side = n.dot(normal).signum();
+    heights.iter().all(|h| h * side > 0.0) && faces_away(normal, side * n)
 }
 
 /// What is seen of a polygon.
@@ -140,6 +151,38 @@ impl Shadows {
         );
         // The tree's shape must not show in the result.
         self.found.sort_unstable();
+        self.add_found(observer, frame, polygon, reach, active);
+    }
+
+    /// As [`Shadows::find`], with occluders that are known to be the only candidates.
+    pub fn cast(
+        &mut self,
+        observer: &Observer,
+        frame: &Frame,
+        polygon: &[DVec2],
+        candidates: impl Iterator<Item = u32>,
+        active: &mut Vec<u32>,
+    ) {
+        self.shadows.clear();
+        self.lines.clear();
+        self.corners.clear();
+        self.found.clear();
+        self.found.extend(candidates.map(|i| i as usize));
+        self.foot = frame.project(observer.point);
+        let distance = |&x: &DVec2| frame.lift(x).distance(observer.point);
+        let reach = polygon.iter().map(distance).fold(0.0, f64::max);
+        self.add_found(observer, frame, polygon, reach, active);
+    }
+
+    fn add_found(
+        &mut self,
+        observer: &Observer,
+        frame: &Frame,
+        polygon: &[DVec2],
+        reach: f64,
+        active: &mut Vec<u32>,
+    ) {
+        let tau = observer.occluders.coincidence();
         for k in 0..self.found.len() {
             let index = self.found[k];
             if observer.cannot_be_shaded_by(index)

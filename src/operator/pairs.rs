@@ -1,0 +1,315 @@
+//! Pairs of clusters: what receiving and radiating parts of the surface are to each other.
+//!
+//! Both quadtrees are descended at once. A pair of clusters is passed over where one is behind the
+//! other or all of it is proved hidden; it is *far* where it is proved fully visible and the
+//! clusters are small compared with their distance; and it is handed down otherwise, with the list
+//! of occluders that may still stand between. What reaches the elements of the receiving side
+//! are *links*, from an element to a cluster whose radiosity is as good as linear, or is too
+//! close to expand: they are integrated exactly, node by node, over the visible part.
+
+use glam::{DVec2, DVec3};
+
+use super::walk::Stage;
+use crate::mesh::child;
+use crate::visibility::{Coverage, Shaft, faces_away};
+
+/// A cluster on its way down.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// Its root.
+    pub root: u32,
+    /// Its face.
+    pub face: u32,
+    /// Levels above it in the root's quadtree, and below.
+    pub depth: u32,
+    /// Levels below.
+    pub level: u32,
+    /// Number along its level.
+    pub index: u32,
+    /// Number among all clusters.
+    pub number: u32,
+    /// Corners in the face's plane.
+    pub corners: [DVec2; 3],
+    /// Corners in space.
+    pub space: [DVec3; 3],
+    /// Centre of the smallest enclosing circle.
+    pub centre: DVec3,
+    /// Its radius.
+    pub radius: f64,
+    /// Area, square metres.
+    pub area: f64,
+}
+
+impl Cell {
+    /// A whole root.
+    pub fn root(stage: Stage, root: u32) -> Cell {
+        let r = &stage.mesh.roots[root as usize];
+        let [a, b, c] = r.corners;
+        let area = 0.5 * (b - a).perp_dot(c - a);
+        let radius = stage.clusters.root_radius[root as usize];
+        Cell::new(stage, (root, r.face), (0, r.level), 0, r.corners, radius, area)
+    }
+
+    /// Child `k` of a cluster that is no element.
+    pub fn child(&self, stage: Stage, k: u32) -> Cell {
+        Cell::new(
+            stage,
+            (self.root, self.face),
+            (self.depth + 1, self.level - 1),
+            4 * self.index + k,
+            child(&self.corners, k as usize),
+            0.5 * self.radius,
+            0.25 * self.area,
+        )
+    }
+
+    fn new(
+        stage: Stage,
+        (root, face): (u32, u32),
+        (depth, level): (u32, u32),
+        index: u32,
+        corners: [DVec2; 3],
+        radius: f64,
+        area: f64,
+    ) -> Cell {
+        let frame = &stage.mesh.faces[face as usize].frame;
+        let number = stage.clusters.number(root as usize, depth, index);
+        let space = corners.map(|x| frame.lift(x));
+        let centre = frame.lift(stage.clusters.centre[number as usize]);
+        Cell { root, face, depth, level, index, number, corners, space, centre, radius, area }
+    }
+
+    /// The first of its elements.
+    pub fn first_element(&self, stage: Stage) -> u32 {
+        stage.mesh.roots[self.root as usize].first + (self.index << (2 * self.level))
+    }
+}
+
+/// What decides the fate of a pair.
+#[derive(Clone, Copy)]
+pub struct Rules<'a> {
+    /// Far: R_P + R_Q <= eta times the distance of the centres.
+    pub eta: f64,
+    /// Root mean square deviation of the radiosity of each cluster from linear.
+    pub deviation: &'a [f64],
+    /// Largest product of deviation and form factor that a link may have, W/m^2.
+    pub allowed: f64,
+    /// Receivers of at most this many levels take fully visible clusters as links where they may.
+    pub link_levels: u32,
+    /// Which roots radiate.
+    pub sends: &'a [bool],
+}
+
+/// A radiating cluster that is not settled yet.
+#[derive(Clone, Copy, Debug)]
+pub struct Source {
+    /// The cluster.
+    pub cell: Cell,
+    /// Occluders that may stand between: a range of [`Pending::occluders`].
+    pub between: (u32, u32),
+}
+
+/// Sources that wait for a receiver's children, or are its links.
+#[derive(Clone, Debug, Default)]
+pub struct Pending {
+    /// Face by face.
+    pub sources: Vec<Source>,
+    /// Numbers of occluders.
+    pub occluders: Vec<u32>,
+}
+
+/// How pairs were settled; the report shows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PairCounts {
+    /// Passed over: one behind the other, or in one plane.
+    pub away: u64,
+    /// Passed over: proved hidden.
+    pub hidden: u64,
+    /// Settled as far.
+    pub far: u64,
+    /// Pairs that were looked at and had no occluder between: visibility was never asked again.
+    pub clear: u64,
+    /// Pairs whose occluders were looked at.
+    pub shaded: u64,
+    /// Links, of elements to clusters.
+    pub links: u64,
+}
+
+impl std::ops::AddAssign for PairCounts {
+    fn add_assign(&mut self, o: PairCounts) {
+        self.away += o.away;
+        self.hidden += o.hidden;
+        self.far += o.far;
+        self.clear += o.clear;
+        self.shaded += o.shaded;
+        self.links += o.links;
+    }
+}
+
+/// What comes of the descent.
+pub trait Receiver {
+    /// A far pair.
+    fn far(&mut self, receiver: &Cell, source: &Cell);
+    /// All links of an element: `pending.sources[from..]`.
+    fn links(&mut self, element: &Cell, pending: &Pending, from: usize);
+    /// A receiver that is left to another task; its sources are `pending.sources[from..]`.
+    fn task(&mut self, receiver: &Cell, pending: &Pending, from: usize);
+}
+
+/// Descends from one receiver.
+pub struct Descent<'a, 'b, R> {
+    /// The surface.
+    pub stage: Stage<'a>,
+    /// What decides.
+    pub rules: Rules<'b>,
+    /// Receivers of this level are left to tasks of their own.
+    pub task_level: Option<u32>,
+    /// What waits.
+    pub pending: Pending,
+    /// How pairs were settled.
+    pub counts: PairCounts,
+    /// Hears of what comes of it.
+    pub out: R,
+}
+
+/// All radiating roots that a root may see, with the occluders between.
+pub fn sources_of(
+    stage: Stage,
+    receiver: &Cell,
+    sends: &[bool],
+    counts: &mut PairCounts,
+) -> Pending {
+    let Stage { mesh, occluders, .. } = stage;
+    let tau = occluders.coincidence();
+    let own = &mesh.faces[receiver.face as usize];
+    let mut pending = Pending::default();
+    for (number, face) in mesh.faces.iter().enumerate() {
+        let roots = face.roots.0..face.roots.1;
+        if !roots.clone().any(|r| sends[r as usize]) {
+            continue;
+        }
+        let space = face.corners.map(|x| face.frame.lift(x));
+        if number as u32 == receiver.face
+            || receiver.space.iter().all(|&x| face.frame.height(x) <= tau)
+            || space.iter().all(|&x| own.frame.height(x) <= tau)
+            || faces_away(own.frame.n, face.frame.n)
+        {
+            counts.away += 1;
+            continue;
+        }
+        let begin = pending.occluders.len() as u32;
+        Shaft::new(occluders, (receiver.space, own.frame.n), (space, face.frame.n))
+            .find(&mut pending.occluders);
+        let between = (begin, pending.occluders.len() as u32);
+        for root in roots.filter(|&r| sends[r as usize]) {
+            pending.sources.push(Source { cell: Cell::root(stage, root), between });
+        }
+    }
+    pending
+}
+
+impl<R: Receiver> Descent<'_, '_, R> {
+    /// Settles the sources `pending.sources[from..]` of a receiver and of all below it; what it adds
+    /// to the list it takes away again.
+    pub fn visit(&mut self, receiver: &Cell, from: usize) {
+        let (to, occluders_to) = (self.pending.sources.len(), self.pending.occluders.len());
+        for k in from..to {
+            let source = self.pending.sources[k];
+            self.settle(receiver, &source);
+        }
+        if receiver.level == 0 {
+            self.counts.links += (self.pending.sources.len() - to) as u64;
+            self.out.links(receiver, &self.pending, to);
+        } else {
+            for k in 0..4 {
+                let below = receiver.child(self.stage, k);
+                if self.task_level == Some(below.level) {
+                    self.out.task(&below, &self.pending, to);
+                } else {
+                    self.visit(&below, to);
+                }
+            }
+        }
+        self.pending.sources.truncate(to);
+        self.pending.occluders.truncate(occluders_to);
+    }
+
+    fn settle(&mut self, receiver: &Cell, source: &Source) {
+        let Stage { mesh, occluders, .. } = self.stage;
+        let tau = occluders.coincidence();
+        let cell = &source.cell;
+        let frames =
+            (&mesh.faces[receiver.face as usize].frame, &mesh.faces[cell.face as usize].frame);
+        let of_receiver = receiver.space.map(|x| frames.1.height(x));
+        let of_source = cell.space.map(|x| frames.0.height(x));
+        let behind = |heights: &[f64; 3]| heights.iter().all(|&h| h <= tau);
+        if behind(&of_receiver) || behind(&of_source) {
+            self.counts.away += 1;
+            return;
+        }
+        let above = of_receiver.iter().chain(&of_source).all(|&h| h >= -tau);
+        let highest = |heights: &[f64; 3]| heights.iter().copied().fold(0.0, f64::max);
+        let may_link = self.may_link(receiver, cell, highest(&of_receiver), highest(&of_source));
+        let mut between = source.between;
+        if between.0 == between.1 {
+            self.counts.clear += 1;
+        } else {
+            self.counts.shaded += 1;
+            // At an element each node looks for itself.
+            if !(receiver.level == 0 && may_link) {
+                let shaft =
+                    Shaft::new(occluders, (receiver.space, frames.0.n), (cell.space, frames.1.n));
+                let begin = self.pending.occluders.len();
+                if shaft.narrow(&mut self.pending.occluders, between) == Coverage::Hidden {
+                    self.counts.hidden += 1;
+                    return;
+                }
+                between = (begin as u32, self.pending.occluders.len() as u32);
+            }
+        }
+        let clear = between.0 == between.1;
+        let source = Source { cell: *cell, between };
+        if clear && above {
+            if may_link && receiver.level <= self.rules.link_levels {
+                self.pending.sources.push(source);
+                return;
+            }
+            let distance = receiver.centre.distance(cell.centre);
+            if receiver.radius + cell.radius <= self.rules.eta * distance {
+                self.counts.far += 1;
+                self.out.far(receiver, cell);
+                return;
+            }
+        } else if may_link {
+            self.pending.sources.push(source);
+            return;
+        }
+        if cell.level > 0 && (cell.radius >= receiver.radius || receiver.level == 0) {
+            for k in 0..4 {
+                let cell = cell.child(self.stage, k);
+                self.settle(receiver, &Source { cell, between });
+            }
+        } else {
+            self.pending.sources.push(source);
+        }
+    }
+
+    /// Whether the source's fit may stand for it in links to the receiver's nodes: its deviation
+    /// times a bound on its form factor, area cos cos / (pi distance^2), is allowed.
+    fn may_link(&self, receiver: &Cell, source: &Cell, height: f64, rise: f64) -> bool {
+        if source.level == 0 {
+            return true;
+        }
+        let deviation = self.rules.deviation[source.number as usize];
+        if deviation <= self.rules.allowed {
+            return true;
+        }
+        let d = receiver.centre.distance(source.centre) - receiver.radius - source.radius;
+        if d <= 0.0 {
+            return false;
+        }
+        let cosines = (height / d).min(1.0) * (rise / d).min(1.0);
+        let factor = source.area * cosines / (std::f64::consts::PI * d * d);
+        deviation * factor.min(1.0) <= self.rules.allowed
+    }
+}
