@@ -65,9 +65,10 @@ fn a_furnace_is_uniform() {
     let (operator, n) = (exact_of(&prepared), prepared.mesh.nodes());
     for rho in [0.1, 0.5, 0.9, 0.99] {
         let solution = solve(
-            &|u, out| operator.apply(u, out),
+            &operator,
             &vec![DVec3::splat(rho); n],
             &vec![DVec3::new(1.0, 2.0, 0.0); n],
+            None,
             &SolveOptions { residual: 1e-13, most_iterations: 500 },
             &Monitor::silent(),
         )
@@ -87,9 +88,7 @@ fn scenes_of_one_shape_have_one_solution() {
         let operator = exact_of(&prepared);
         let (rho, e) = lumel::mesh::appearance(scene, &prepared.mesh);
         let options = SolveOptions { residual: 1e-13, most_iterations: 500 };
-        solve(&|u, out| operator.apply(u, out), &rho, &e, &options, &Monitor::silent())
-            .unwrap()
-            .irradiance
+        solve(&operator, &rho, &e, None, &options, &Monitor::silent()).unwrap().irradiance
     };
     let base = irradiance(&scene);
     let largest = base.iter().map(|h| h.x).fold(0.0, f64::max);

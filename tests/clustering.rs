@@ -31,10 +31,10 @@ fn smooth(prepared: &Prepared) -> Vec<DVec3> {
 /// and order (columns); and the share of far clusters in what is stored.
 fn errors(prepared: &Prepared, etas: &[f64], orders: &[usize]) -> Vec<Vec<f64>> {
     let u = smooth(prepared);
-    let mut exact = vec![DVec3::ZERO; u.len()];
-    exact_of(prepared).apply(&u, &mut exact);
-    let largest = exact.iter().map(|h| h.max_element()).fold(0.0, f64::max);
     let values: Vec<[f64; 3]> = u.iter().map(|u| u.to_array()).collect();
+    let mut exact = vec![[0.0; 3]; u.len()];
+    exact_of(prepared).apply(&values, &mut exact);
+    let largest = exact.as_flattened().iter().copied().fold(0.0, f64::max);
     etas.iter()
         .map(|&eta| {
             let options = ClusteredOptions::new(eta, 1).unwrap();
@@ -45,9 +45,8 @@ fn errors(prepared: &Prepared, etas: &[f64], orders: &[usize]) -> Vec<Vec<f64>> 
             let error = |order: usize| {
                 let mut out = vec![[0.0; 3]; values.len()];
                 operator.apply_channels(order, &values, &mut out);
-                let of =
-                    |(o, e): (&[f64; 3], &DVec3)| (DVec3::from_array(*o) - e).abs().max_element();
-                out.iter().zip(&exact).map(of).fold(0.0, f64::max) / largest
+                let both = out.as_flattened().iter().zip(exact.as_flattened());
+                both.map(|(o, e)| (o - e).abs()).fold(0.0, f64::max) / largest
             };
             orders.iter().map(|&order| error(order)).collect()
         })
@@ -112,8 +111,9 @@ fn what_memory_does_not_keep_is_found_again() {
     let product = |memory: u64| {
         let operator =
             ClusteredOperator::build(prepared.stage(), options, memory, &silent).unwrap();
-        let mut out = vec![DVec3::ZERO; prepared.mesh.nodes()];
-        operator.apply(&smooth(&prepared), &mut out);
+        let values: Vec<[f64; 3]> = smooth(&prepared).iter().map(|u| u.to_array()).collect();
+        let mut out = vec![[0.0; 3]; prepared.mesh.nodes()];
+        operator.apply(&values, &mut out);
         (operator.kept, out)
     };
     use lumel::operator::clustered::Kept;

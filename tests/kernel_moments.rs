@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use lumel::geometry::Frame;
-use lumel::kernel::{EXACT, View, gauss, moments, quadrature};
+use lumel::kernel::{Precision, View, gauss, moments, quadrature};
 
 /// Small deterministic generator (SplitMix64).
 struct Random(u64);
@@ -91,7 +91,7 @@ fn error(triangle: [DVec2; 3], receiver: DVec3, normal: DVec3) -> f64 {
     let want = adaptive.integrate(corners, first, scaled(2e-14 * rough.x.abs()), 60);
     let frame = Frame::new(DVec3::ZERO, DVec3::Z);
     assert_eq!((frame.u, frame.v), (DVec3::X, DVec3::Y));
-    let got = moments(&View::new(&frame, receiver, normal), &triangle, centre, EXACT);
+    let got = moments(&View::new(&frame, receiver, normal), &triangle, centre, &Precision::EXACT);
     // Relative, but for one rounding of a full hemisphere (pi), which grazing views lose.
     let scale = want.x.abs() + 1e-15 / 1e-12;
     let e0 = (got.zeroth - want.x).abs() / scale;

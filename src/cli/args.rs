@@ -240,14 +240,19 @@ pub struct SolveArgs {
     #[arg(long, value_name = "LEVELS", value_parser = values::levels, allow_negative_numbers = true)]
     pub subdivide: Option<u32>,
     /// How the operator of the equation is represented
-    #[arg(long, value_enum, default_value = "exact")]
+    #[arg(long, value_enum, default_value = "fast")]
     pub operator: OperatorArg,
-    /// With --operator clustered: clusters of radius up to ETA times their distance are far
-    #[arg(long, value_name = "ETA", default_value = "0.25", value_parser = values::positive, allow_negative_numbers = true)]
-    pub eta: f64,
-    /// With --operator clustered: terms of total degree below M are kept of far clusters
-    #[arg(long, value_name = "M", default_value = "6")]
-    pub order: usize,
+    /// With --operator fast: errors of the irradiance that it may make, relative to the largest
+    #[arg(long, value_name = "T", default_value = "1e-4", value_parser = values::residual, allow_negative_numbers = true)]
+    pub operator_tolerance: f64,
+    /// For experts: clusters of radius up to ETA times their distance are far (of both clusters
+    /// together with --operator fast) [default: 0.5; 0.25 with --operator clustered]
+    #[arg(long, value_name = "ETA", value_parser = values::positive, allow_negative_numbers = true)]
+    pub eta: Option<f64>,
+    /// For experts: polynomials of total degree below M represent what is far [default: by the
+    /// tolerance; 6 with --operator clustered]
+    #[arg(long, value_name = "M")]
+    pub order: Option<usize>,
     /// Iterate until the relative residual is below this
     #[arg(long, value_name = "R", default_value = "1e-8", value_parser = values::residual, allow_negative_numbers = true)]
     pub residual: f64,
@@ -286,6 +291,9 @@ pub enum BasisArg {
 /// How the operator is represented.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum OperatorArg {
+    /// Both sides clustered, exact visibility, to a tolerance; time and memory in proportion to
+    /// the elements
+    Fast,
     /// Every coefficient, exactly
     Exact,
     /// Exact near by and across shadows, Taylor polynomials far away: Hackbusch and Nowak's

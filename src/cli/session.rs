@@ -103,17 +103,8 @@ impl Session {
         report.count("occluders", light.occluders.len());
         report.count("iterations", light.solution.iterations);
         report.count("operator entries", light.entries);
-        let counts = light.counts;
-        for (name, count) in [
-            ("faces turned away from a node", counts.faces_away),
-            ("faces clear of occluders", counts.faces_clear),
-            ("faces with occluders between", counts.faces_shaded),
-            ("far clusters", counts.far),
-            ("near elements", counts.near),
-            ("gray elements", counts.gray),
-            ("hidden elements", counts.hidden),
-        ] {
-            report.count(name, count as usize);
+        for (name, count) in &light.counts {
+            report.count(name, *count as usize);
         }
         report.value("operator bytes", light.bytes as f64);
         report.value("operator bytes forecast", light.forecast as f64);

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 use lumel::mesh::{self, Basis, MeshOptions};
-use lumel::operator::{ClusteredOptions, OperatorKind};
+use lumel::operator::{ClusteredOptions, FastOptions, OperatorKind};
 use lumel::output::machine;
 use lumel::output::picture::{PictureFormat, PictureOptions};
 use lumel::reference::ReferenceOptions;
@@ -364,6 +364,12 @@ impl SolveSettings {
             Refinement::Levels(levels) => list.push(pair("subdivide", levels)),
         }
         match self.operator {
+            OperatorKind::Fast(fast) => {
+                list.push(pair("operator", "fast"));
+                list.push(pair("operator-tolerance", fast.tolerance));
+                list.push(pair("eta", fast.eta()));
+                list.push(pair("order", fast.order()));
+            }
             OperatorKind::Exact => list.push(pair("operator", "exact")),
             OperatorKind::Clustered(ClusteredOptions { eta, order }) => {
                 list.push(pair("operator", "clustered"));
@@ -438,10 +444,14 @@ fn solve(args: &SolveArgs) -> Result<SolveSettings> {
         (None, None) => Refinement::Usual,
     };
     let operator = match args.operator {
-        OperatorArg::Exact => OperatorKind::Exact,
-        OperatorArg::Clustered => {
-            OperatorKind::Clustered(ClusteredOptions::new(args.eta, args.order)?)
+        OperatorArg::Fast => {
+            OperatorKind::Fast(FastOptions::new(args.operator_tolerance, args.order, args.eta)?)
         }
+        OperatorArg::Exact => OperatorKind::Exact,
+        OperatorArg::Clustered => OperatorKind::Clustered(ClusteredOptions::new(
+            args.eta.unwrap_or(0.25),
+            args.order.unwrap_or(6),
+        )?),
     };
     Ok(SolveSettings {
         basis: args.basis,

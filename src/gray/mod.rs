@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use crate::geometry::Pieces;
 use crate::geometry::polygon::Linear;
-use crate::kernel::{Moments, View, moments_above};
+use crate::kernel::{Moments, Precision, View, moments_above};
 
 /// Moments of G V about the element's centroid, from its visible pieces.
 pub fn moments(
@@ -15,7 +15,7 @@ pub fn moments(
     horizon: &Linear,
     element: &[DVec2; 3],
     visible: &Pieces,
-    precision: f64,
+    precision: &Precision,
     scratch: &mut Pieces,
 ) -> Moments {
     let centroid = (element[0] + element[1] + element[2]) / 3.0;

@@ -84,30 +84,44 @@ impl std::ops::AddAssign for Moments {
 /// distance over radius, and one more in the first moment), and 12 x 12 Gauss points are exact.
 const CLOSED_FORM_ABOVE: f64 = 0.25;
 
-/// The precision of integrals that are as exact as the closed forms: see [`moments`].
-pub const EXACT: f64 = 0.0;
-
-/// Radius over distance above which Gauss rules are too long, at any precision.
-const GAUSS_BELOW: f64 = 0.7;
+/// How precise integrals are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Precision {
+    /// Largest radius over distance for each number of Gauss points a direction, from 1 on.
+    ladder: [f64; MOST_POINTS],
+}
 
 /// Most points a direction for which a Gauss rule is faster than the closed form.
-const MOST_POINTS: usize = 12;
+const MOST_POINTS: usize = 11;
+
+impl Precision {
+    /// As exact as the closed forms: see [`moments`].
+    pub const EXACT: Precision = Precision { ladder: [0.0; MOST_POINTS] };
+
+    /// Errors below `bound` times area/distance^2; those of the first moment times the radius.
+    /// Exact for a bound of 0.
+    pub fn within(bound: f64) -> Precision {
+        let rung = |k: usize| if bound > 0.0 { quadrature::ratio_for(k + 1, bound) } else { 0.0 };
+        Precision { ladder: std::array::from_fn(rung) }
+    }
+
+    /// Points a direction that suffice, unless too many are needed.
+    fn points(&self, ratio: f64) -> Option<usize> {
+        self.ladder.iter().position(|&most| ratio <= most).map(|k| k + 1)
+    }
+}
 
 /// Integrals over a convex polygon that lies above the receiver's horizon.
 ///
-/// With precision [`EXACT`] the relative error is 1e-12 in the zeroth moment; in the first moment
-/// 1e-12 of the zeroth times the polygon's radius. Any other precision bounds the errors relative to
-/// area/distance^2 (and that times the radius).
-pub fn moments(view: &View, polygon: &[DVec2], about: DVec2, precision: f64) -> Moments {
+/// With [`Precision::EXACT`] the relative error is 1e-12 in the zeroth moment; in the first moment
+/// 1e-12 of the zeroth times the polygon's radius.
+pub fn moments(view: &View, polygon: &[DVec2], about: DVec2, precision: &Precision) -> Moments {
     let centre = polygon.iter().sum::<DVec2>() / polygon.len() as f64;
     let radius = polygon.iter().map(|x| x.distance_squared(centre)).fold(0.0, f64::max).sqrt();
     let distance = (centre.distance_squared(view.foot) + view.d * view.d).sqrt();
     let ratio = radius / distance;
-    if precision > EXACT && ratio <= GAUSS_BELOW {
-        let points = quadrature::points_within(ratio, precision);
-        if points <= MOST_POINTS.min(quadrature::points_for(ratio)) {
-            return quadrature::moments(view, polygon, about, points);
-        }
+    if let Some(points) = precision.points(ratio) {
+        return quadrature::moments(view, polygon, about, points);
     }
     if ratio > CLOSED_FORM_ABOVE {
         closed_form::moments(view, polygon, about)
@@ -122,7 +136,7 @@ pub fn moments_above(
     polygon: &[DVec2],
     about: DVec2,
     horizon: &Linear,
-    precision: f64,
+    precision: &Precision,
     scratch: &mut Pieces,
 ) -> Moments {
     if horizon.nowhere_negative(polygon) {

@@ -76,6 +76,16 @@ pub fn build(scene: &Scene, options: &MeshOptions) -> Result<Mesh> {
     })
 }
 
+impl Mesh {
+    /// The same surface, each root refined `levels` times less (or not at all).
+    pub fn coarsened(&self, levels: u32) -> Result<Mesh> {
+        let mut roots = self.roots.clone();
+        roots.iter_mut().for_each(|r| r.level = r.level.saturating_sub(levels));
+        let (element_root, element_corners) = elements(&mut roots)?;
+        Ok(Mesh { roots, element_root, element_corners, ..self.clone() })
+    }
+}
+
 /// Corners of the roots of a face whose triangle was cut as `cut` says, in coordinates of the
 /// triangle's front, a plane with frame `front`.
 fn root_corners(face: &Face, front: &Frame, cut: Option<&Cut>) -> Vec<[DVec2; 3]> {

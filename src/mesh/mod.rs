@@ -114,6 +114,7 @@ pub struct Root {
 }
 
 /// The refined surface of a scene.
+#[derive(Clone)]
 pub struct Mesh {
     /// Polynomials on the elements.
     pub basis: Basis,

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::geometry::Pieces;
 use crate::geometry::polygon::Linear;
-use crate::kernel::{Moments, View, moments_above};
+use crate::kernel::{Moments, Precision, View, moments_above};
 use crate::mesh::{ALPHA, Basis};
 
 /// Moments of G about its centroid over what lies above the horizon of a fully visible element.
@@ -12,7 +12,7 @@ pub fn moments(
     view: &View,
     horizon: &Linear,
     element: &[DVec2; 3],
-    precision: f64,
+    precision: &Precision,
     scratch: &mut Pieces,
 ) -> Moments {
     let centroid = (element[0] + element[1] + element[2]) / 3.0;

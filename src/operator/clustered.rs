@@ -271,12 +271,9 @@ impl<'a> ClusteredOperator<'a> {
         self.chunks.iter().map(of).sum()
     }
 
-    /// out = A u for three right-hand sides at once, with the operator's own order.
-    pub fn apply(&self, u: &[DVec3], out: &mut [DVec3]) {
-        let values: Vec<[f64; 3]> = u.iter().map(|u| u.to_array()).collect();
-        let mut product = vec![[0.0; 3]; u.len()];
-        self.apply_channels(self.options.order, &values, &mut product);
-        out.iter_mut().zip(product).for_each(|(o, p)| *o = DVec3::from_array(p));
+    /// out = A u for C channels, with the operator's own order.
+    pub fn apply<const C: usize>(&self, u: &[[f64; C]], out: &mut [[f64; C]]) {
+        self.apply_channels(self.options.order, u, out);
     }
 
     /// out = A u for C channels, with polynomials of any order.

@@ -2,7 +2,6 @@
 
 use std::mem::size_of;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::walk::{Counts, Stage, Walker};
@@ -116,8 +115,8 @@ impl ExactOperator {
         rows + self.entries() * (size_of::<u32>() + self.per_element * size_of::<f64>())
     }
 
-    /// out = A u for three right-hand sides at once; both have one entry a node.
-    pub fn apply(&self, u: &[DVec3], out: &mut [DVec3]) {
+    /// out = A u for C channels at once; both have one entry a node.
+    pub fn apply<const C: usize>(&self, u: &[[f64; C]], out: &mut [[f64; C]]) {
         let n = self.per_element;
         self.chunks.par_iter().zip(out.par_chunks_mut(ROWS_PER_TASK)).for_each(|(chunk, out)| {
             let mut begin = 0;
@@ -125,11 +124,13 @@ impl ExactOperator {
                 let end = end as usize;
                 let elements = &chunk.elements[begin..end];
                 let coefficients = chunk.coefficients[begin * n..end * n].chunks_exact(n);
-                let mut sum = DVec3::ZERO;
+                let mut sum = [0.0; C];
                 for (&element, c) in elements.iter().zip(coefficients) {
                     let values = &u[element as usize * n..][..n];
                     for (c, value) in c.iter().zip(values) {
-                        sum += *c * *value;
+                        for (s, v) in sum.iter_mut().zip(value) {
+                            *s += c * v;
+                        }
                     }
                 }
                 *out = sum;

@@ -1,9 +1,11 @@
 //! Links: exact coefficients between the nodes of an element and visible parts of clusters.
 
+use glam::DVec3;
+
 use super::pairs::{Cell, Pending, Source};
 use super::walk::Stage;
-use crate::geometry::Pieces;
-use crate::kernel::{Moments, View};
+use crate::geometry::{Frame, Pieces};
+use crate::kernel::{Moments, Precision, View};
 use crate::mesh::Basis;
 use crate::visibility::{Coverage, Observer, Shadows};
 use crate::{gray, near};
@@ -21,36 +23,51 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Bytes of its lists.
-    pub fn bytes(&self) -> usize {
-        4 * (self.ends.len() + self.clusters.len()) + 24 * self.coefficients.len()
-    }
-
-    /// Gives back memory that is not needed.
-    pub fn shrink(&mut self) {
-        self.ends.shrink_to_fit();
-        self.clusters.shrink_to_fit();
-        self.coefficients.shrink_to_fit();
+    /// Forgets all rows; keeps the memory.
+    pub fn clear(&mut self) {
+        self.ends.clear();
+        self.clusters.clear();
+        self.coefficients.clear();
     }
 }
 
 /// Memory for linking, used again for every element.
-#[derive(Default)]
 pub struct Linker {
-    /// As [`crate::kernel::moments`] takes it.
-    precision: f64,
+    precision: Precision,
     shadows: Shadows,
     active: Vec<u32>,
+    /// Occluders of one face after the other, and the shadow of each (or none).
     candidates: Vec<u32>,
-    /// Ranges of sources of one face, and of the occluders between.
-    groups: Vec<(usize, usize, usize)>,
+    numbers: Vec<u32>,
+    /// For each source in turn its occluders, as places in the list of its face.
+    places: Vec<u32>,
+    groups: Vec<Group>,
     clip: Pieces,
 }
 
+/// Sources of one face.
+#[derive(Clone, Copy)]
+struct Group {
+    /// Their range in the list of sources.
+    sources: (usize, usize),
+    /// The range of their occluders among the candidates, and the first place.
+    candidates: (usize, usize),
+    places: usize,
+}
+
 impl Linker {
-    /// For integrals of a precision, as [`crate::kernel::moments`] takes it.
-    pub fn new(precision: f64) -> Linker {
-        Linker { precision, ..Linker::default() }
+    /// For integrals of a precision.
+    pub fn new(precision: Precision) -> Linker {
+        Linker {
+            precision,
+            shadows: Shadows::default(),
+            active: vec![],
+            candidates: vec![],
+            numbers: vec![],
+            places: vec![],
+            groups: vec![],
+            clip: Pieces::default(),
+        }
     }
 
     /// Appends the rows of an element's nodes; its links are `pending.sources[from..]`.
@@ -68,37 +85,63 @@ impl Linker {
         for node in first..first + mesh.basis.nodes() {
             let (point, normal) = mesh.node(node);
             let observer = Observer { occluders, point, normal };
-            let mut begin = 0;
             for g in 0..self.groups.len() {
-                let (one, end, candidates_end) = self.groups[g];
-                let candidates = begin..candidates_end;
-                begin = candidates_end;
-                self.face(&observer, stage, &pending.sources[one..end], candidates, rows);
+                let group = self.groups[g];
+                let (first, end) = group.sources;
+                self.face(&observer, stage, &pending.sources[first..end], &group, rows);
             }
             rows.ends.push(rows.clusters.len() as u32);
         }
     }
 
-    /// Finds runs of sources of one face, and lists the occluders of each once.
+    /// Appends the integrals of G times the three basis functions of a fully visible cluster, as
+    /// points of a plane see them: three columns, with one entry a point.
+    pub fn columns(
+        &mut self,
+        stage: Stage,
+        points: &[DVec3],
+        (own, other): (&Frame, &Frame),
+        source: &Cell,
+        columns: &mut Vec<f64>,
+    ) {
+        let (n, begin) = (points.len(), columns.len());
+        columns.resize(begin + 3 * n, 0.0);
+        for (i, &point) in points.iter().enumerate() {
+            let view = View::new(other, point, own.n);
+            let horizon = view.horizon(stage.occluders.magnitude);
+            let corners = &source.corners;
+            let moments = near::moments(&view, &horizon, corners, &self.precision, &mut self.clip);
+            let three = near::coefficients(moments, corners, Basis::Linear);
+            for (k, c) in three.into_iter().enumerate() {
+                columns[begin + k * n + i] = c;
+            }
+        }
+    }
+
+    /// Finds runs of sources of one face, and lists the occluders of each run once.
     fn group(&mut self, pending: &Pending, from: usize) {
         self.groups.clear();
         self.candidates.clear();
+        self.places.clear();
         let mut begin = from;
         while begin < pending.sources.len() {
             let face = pending.sources[begin].cell.face;
             let same = pending.sources[begin..].iter().take_while(|s| s.cell.face == face).count();
-            let candidates = self.candidates.len();
+            let (first, places) = (self.candidates.len(), self.places.len());
             for source in &pending.sources[begin..begin + same] {
-                let (first, last) = source.between;
-                for &i in &pending.occluders[first as usize..last as usize] {
-                    if !self.candidates[candidates..].contains(&i) {
+                let (from, to) = source.between;
+                for &i in &pending.occluders[from as usize..to as usize] {
+                    let known = self.candidates[first..].iter().position(|&c| c == i);
+                    let place = known.unwrap_or_else(|| {
                         self.candidates.push(i);
-                    }
+                        self.candidates.len() - 1 - first
+                    });
+                    self.places.push(place as u32);
                 }
             }
-            self.candidates[candidates..].sort_unstable();
+            let sources = (begin, begin + same);
+            self.groups.push(Group { sources, candidates: (first, self.candidates.len()), places });
             begin += same;
-            self.groups.push((begin - same, begin, self.candidates.len()));
         }
     }
 
@@ -108,7 +151,7 @@ impl Linker {
         observer: &Observer,
         stage: Stage,
         sources: &[Source],
-        candidates: std::ops::Range<usize>,
+        group: &Group,
         rows: &mut Rows,
     ) {
         let face = &stage.mesh.faces[sources[0].cell.face as usize];
@@ -118,33 +161,38 @@ impl Linker {
             return;
         }
         let horizon = view.horizon(occluders.magnitude);
-        self.active.clear();
-        if !candidates.is_empty() {
-            let list = self.candidates[candidates].iter().copied();
-            self.shadows.cast(observer, &face.frame, &face.corners, list, &mut self.active);
+        self.numbers.clear();
+        let (first, end) = group.candidates;
+        if first < end {
+            let list = &self.candidates[first..end];
+            self.shadows.cast(observer, &face.frame, &face.corners, list, &mut self.numbers);
         }
-        let shadows = self.active.len();
+        let mut place = group.places;
         for source in sources {
             let corners = &source.cell.corners;
+            let places = place..place + (source.between.1 - source.between.0) as usize;
+            place = places.end;
             if horizon.nowhere_positive(corners) {
                 continue;
             }
-            let coverage = if source.between.0 == source.between.1 || shadows == 0 {
-                Coverage::Full
-            } else {
-                self.shadows.narrow(corners, &mut self.active, 0)
+            self.active.clear();
+            let shadows = self.places[places].iter().map(|&p| self.numbers[p as usize]);
+            self.active.extend(shadows.filter(|&number| number != Shadows::NONE));
+            let to = self.active.len();
+            let coverage = match to {
+                0 => Coverage::Full,
+                _ => self.shadows.narrow(corners, &mut self.active, 0),
             };
             let moments = match coverage {
                 Coverage::Full => {
-                    near::moments(&view, &horizon, corners, self.precision, &mut self.clip)
+                    near::moments(&view, &horizon, corners, &self.precision, &mut self.clip)
                 }
                 Coverage::Hidden => Moments::default(),
                 Coverage::Partial => {
-                    let pieces = self.shadows.visible(corners, &self.active[shadows..]);
-                    gray::moments(&view, &horizon, corners, pieces, self.precision, &mut self.clip)
+                    let pieces = self.shadows.visible(corners, &self.active[to..]);
+                    gray::moments(&view, &horizon, corners, pieces, &self.precision, &mut self.clip)
                 }
             };
-            self.active.truncate(shadows);
             if moments != Moments::default() {
                 rows.clusters.push(source.cell.number);
                 rows.coefficients.push(near::coefficients(moments, corners, Basis::Linear));

@@ -90,6 +90,8 @@ impl Cell {
 pub struct Rules<'a> {
     /// Far: R_P + R_Q <= eta times the distance of the centres.
     pub eta: f64,
+    /// Far from a cluster taken exactly: R_P <= this times the distance of the centres less R_Q.
+    pub eta_of_one: f64,
     /// Root mean square deviation of the radiosity of each cluster from linear.
     pub deviation: &'a [f64],
     /// Largest product of deviation and form factor that a link may have, W/m^2.
@@ -148,8 +150,8 @@ impl std::ops::AddAssign for PairCounts {
 
 /// What comes of the descent.
 pub trait Receiver {
-    /// A far pair.
-    fn far(&mut self, receiver: &Cell, source: &Cell);
+    /// A far pair; whether the source's fit is good enough for it.
+    fn far(&mut self, receiver: &Cell, source: &Cell, by_fit: bool);
     /// All links of an element: `pending.sources[from..]`.
     fn links(&mut self, element: &Cell, pending: &Pending, from: usize);
     /// A receiver that is left to another task; its sources are `pending.sources[from..]`.
@@ -275,9 +277,12 @@ impl<R: Receiver> Descent<'_, '_, R> {
                 return;
             }
             let distance = receiver.centre.distance(cell.centre);
-            if receiver.radius + cell.radius <= self.rules.eta * distance {
+            // The fit is integrated exactly: only the receiver is small.
+            let by_fit =
+                may_link && receiver.radius <= self.rules.eta_of_one * (distance - cell.radius);
+            if by_fit || receiver.radius + cell.radius <= self.rules.eta * distance {
                 self.counts.far += 1;
-                self.out.far(receiver, cell);
+                self.out.far(receiver, cell, by_fit);
                 return;
             }
         } else if may_link {

@@ -12,7 +12,7 @@ use crate::cluster::{Clusters, admissible};
 use crate::geometry::Pieces;
 use crate::geometry::polygon::Linear;
 use crate::gray;
-use crate::kernel::{EXACT, Moments, View};
+use crate::kernel::{Moments, Precision, View};
 use crate::mesh::{Basis, Face, Mesh, child};
 use crate::near;
 use crate::visibility::{Coverage, Observer, Occluders, Shadows};
@@ -34,6 +34,21 @@ pub struct Counts {
     pub gray: u64,
     /// Elements hidden.
     pub hidden: u64,
+}
+
+impl Counts {
+    /// The counts by name.
+    pub fn named(&self) -> Vec<(&'static str, u64)> {
+        vec![
+            ("faces turned away from a node", self.faces_away),
+            ("faces clear of occluders", self.faces_clear),
+            ("faces with occluders between", self.faces_shaded),
+            ("far clusters", self.far),
+            ("near elements", self.near),
+            ("gray elements", self.gray),
+            ("hidden elements", self.hidden),
+        ]
+    }
 }
 
 impl std::ops::AddAssign for Counts {
@@ -244,12 +259,16 @@ pub fn exact_entry(
 ) -> Option<(u32, [f64; 3])> {
     let (element, corners, moments) = match seen {
         Seen::Far(_) => return None,
-        Seen::Near(e, corners) => {
-            (e, corners, near::moments(&scope.view, &scope.horizon, corners, EXACT, clip))
-        }
-        Seen::Gray(e, corners, pieces) => {
-            (e, corners, gray::moments(&scope.view, &scope.horizon, corners, pieces, EXACT, clip))
-        }
+        Seen::Near(e, corners) => (
+            e,
+            corners,
+            near::moments(&scope.view, &scope.horizon, corners, &Precision::EXACT, clip),
+        ),
+        Seen::Gray(e, corners, pieces) => (
+            e,
+            corners,
+            gray::moments(&scope.view, &scope.horizon, corners, pieces, &Precision::EXACT, clip),
+        ),
     };
     (moments != Moments::default()).then(|| (element, near::coefficients(moments, corners, basis)))
 }

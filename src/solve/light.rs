@@ -2,13 +2,14 @@
 
 use glam::DVec3;
 
+use super::levels::{FastSolve, solve_fast};
 use super::{Solution, SolveOptions, solve};
 use crate::cluster::Clusters;
 use crate::error::Result;
 use crate::mesh::{self, Mesh, MeshOptions};
 use crate::monitor::Monitor;
 use crate::operator::clustered::ClusteredSource;
-use crate::operator::walk::{Counts, Stage, Walker, gather};
+use crate::operator::walk::{Stage, Walker, gather};
 use crate::operator::{Operator, OperatorKind};
 use crate::scene::Scene;
 use crate::visibility::Occluders;
@@ -48,9 +49,10 @@ pub struct Light {
     pub entries: usize,
     /// Bytes that the operator took.
     pub bytes: usize,
-    /// What its rows met.
-    pub counts: Counts,
+    /// What its rows met, by name.
+    pub counts: Vec<(&'static str, u64)>,
     /// Smallest and largest sum of a row over pi: 1 where a node sees radiating sides all around.
+    /// Of the fast operator, rows are those of surfaces that reflect, and dark sides are left out.
     pub row_sums: (f64, f64),
 }
 
@@ -62,13 +64,31 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     let (reflectance, exitance) = mesh::appearance(scene, &mesh);
     let clusters = Clusters::build(&mesh);
     let stage = Stage { mesh: &mesh, clusters: &clusters, occluders: &occluders };
-    let operator = Operator::build(stage, options.operator, options.max_memory, monitor)?;
-    let solution =
-        solve(&|u, out| operator.apply(u, out), &reflectance, &exitance, &options.solve, monitor)?;
+    let (operator, solution, receives, builds) = match options.operator {
+        OperatorKind::Fast(fast) => {
+            let how =
+                FastSolve { scene, fast, solve: options.solve, max_memory: options.max_memory };
+            let solved = solve_fast(stage, &reflectance, &exitance, &how, monitor)?;
+            (solved.operator, solved.solution, solved.receives, solved.builds)
+        }
+        kind => {
+            let operator = Operator::build(stage, kind, options.max_memory, monitor)?;
+            let solution =
+                solve(&operator, &reflectance, &exitance, None, &options.solve, monitor)?;
+            (operator, solution, vec![true; mesh.roots.len()], 1)
+        }
+    };
+    let mut counts = operator.counts();
+    counts.push(("operator builds", builds));
+    counts.push(("channels solved", solution.channels as u64));
     let sums = operator.row_sums(mesh.nodes());
-    let row_sums = sums.iter().fold((f64::MAX, f64::MIN), |(a, b), &s| (a.min(s), b.max(s)));
+    let row_sums = sums
+        .iter()
+        .enumerate()
+        .filter(|(node, _)| receives[mesh.element_root[node / mesh.basis.nodes()] as usize])
+        .fold((f64::MAX, f64::MIN), |(a, b), (_, &s)| (a.min(s), b.max(s)));
     let clustered = match options.operator {
-        OperatorKind::Exact => None,
+        OperatorKind::Exact | OperatorKind::Fast(_) => None,
         OperatorKind::Clustered(clustering) => {
             Some(ClusteredSource::new(stage, clustering, &solution.radiosity))
         }
@@ -78,7 +98,7 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
         forecast: Operator::forecast(stage, options.operator),
         entries: operator.entries(),
         bytes: operator.bytes(),
-        counts: operator.counts(),
+        counts,
         row_sums,
         clusters,
         mesh,

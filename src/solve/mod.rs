@@ -1,6 +1,8 @@
-//! Solving (I - K) u = E: restarted GMRES, three colours in one product.
+//! Solving (I - K) u = E: restarted GMRES, all colours in one product.
 
+mod colours;
 mod gmres;
+pub mod levels;
 pub mod light;
 
 use glam::DVec3;
@@ -8,7 +10,9 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
+use crate::operator::Operator;
 
+pub use colours::Colours;
 pub use gmres::gmres;
 pub use light::{Light, LightOptions};
 
@@ -38,37 +42,87 @@ pub struct Solution {
     pub residual: DVec3,
     /// Products with K that were needed.
     pub iterations: usize,
+    /// Channels that were solved for: fewer than three where some are dark or equal.
+    pub channels: usize,
 }
 
 /// Solves u - rho/pi A u = E.
 ///
-/// `apply(u, out)` computes out = A u; `reflectance` and `exitance` hold rho and E at the nodes.
-/// [`Error::NotConverged`] when the tolerance is not reached, never a silent result.
+/// `reflectance` and `exitance` hold rho and E at the nodes. Channels that are dark, or equal to
+/// another one (up to a factor in E), are not solved for again ([`Colours`]); `guess` is where the
+/// iteration starts. [`Error::NotConverged`] when the tolerance is not reached, never a silent
+/// result.
 pub fn solve(
-    apply: &(dyn Fn(&[DVec3], &mut [DVec3]) + Sync),
+    operator: &Operator,
     reflectance: &[DVec3],
     exitance: &[DVec3],
+    guess: Option<&[DVec3]>,
     options: &SolveOptions,
     monitor: &Monitor,
 ) -> Result<Solution> {
-    let reflect = |u: &[DVec3], out: &mut [DVec3]| {
-        apply(u, out);
-        out.par_iter_mut().zip(reflectance).zip(u).for_each(|((out, rho), u)| {
-            *out = u - *rho / std::f64::consts::PI * *out;
-        });
-    };
-    let (radiosity, residual, iterations) = gmres(&reflect, exitance, options, monitor)?;
-    // What is not a number has not converged either.
-    let converged = residual.max_element() <= options.residual;
-    if !converged {
-        return Err(Error::NotConverged {
-            residual: residual.max_element(),
-            iterations,
-            tolerance: options.residual,
-        });
+    let colours = Colours::of(reflectance, exitance);
+    let problem = Problem { operator, reflectance, exitance, guess, colours: &colours };
+    match colours.solved.len() {
+        0 => problem.dark(),
+        1 => problem.solve::<1>(options, monitor),
+        2 => problem.solve::<2>(options, monitor),
+        _ => problem.solve::<3>(options, monitor),
     }
-    let mut irradiance = vec![DVec3::ZERO; radiosity.len()];
-    apply(&radiosity, &mut irradiance);
-    irradiance.par_iter_mut().for_each(|h| *h /= std::f64::consts::PI);
-    Ok(Solution { radiosity, irradiance, residual, iterations })
+}
+
+struct Problem<'a> {
+    operator: &'a Operator<'a>,
+    reflectance: &'a [DVec3],
+    exitance: &'a [DVec3],
+    guess: Option<&'a [DVec3]>,
+    colours: &'a Colours,
+}
+
+impl Problem<'_> {
+    fn dark(&self) -> Result<Solution> {
+        let zero = vec![DVec3::ZERO; self.exitance.len()];
+        Ok(Solution {
+            radiosity: zero.clone(),
+            irradiance: zero,
+            residual: DVec3::ZERO,
+            iterations: 0,
+            channels: 0,
+        })
+    }
+
+    fn solve<const C: usize>(&self, options: &SolveOptions, monitor: &Monitor) -> Result<Solution> {
+        use std::array::from_fn;
+        let solved = &self.colours.solved;
+        let pick = |x: &[DVec3]| -> Vec<[f64; C]> {
+            x.iter().map(|x| from_fn(|c| x[solved[c]])).collect()
+        };
+        let (rho, b) = (pick(self.reflectance), pick(self.exitance));
+        let apply = |u: &[[f64; C]], out: &mut [[f64; C]]| {
+            self.operator.apply(u, out);
+            out.par_iter_mut().zip(&rho).zip(u).for_each(|((out, rho), u)| {
+                *out = from_fn(|c| u[c] - rho[c] / std::f64::consts::PI * out[c]);
+            });
+        };
+        let (u, residual, iterations) = gmres(&apply, &b, self.guess.map(pick), options, monitor)?;
+        // What is not a number has not converged either.
+        if !residual.iter().all(|&r| r <= options.residual) {
+            return Err(Error::NotConverged {
+                residual: residual.iter().copied().fold(0.0, f64::max),
+                iterations,
+                tolerance: options.residual,
+            });
+        }
+        let mut irradiance = vec![[0.0; C]; u.len()];
+        self.operator.apply(&u, &mut irradiance);
+        let spread = |x: &[[f64; C]], scale: f64| -> Vec<DVec3> {
+            x.iter().map(|x| scale * self.colours.spread(x)).collect()
+        };
+        Ok(Solution {
+            radiosity: spread(&u, 1.0),
+            irradiance: spread(&irradiance, std::f64::consts::FRAC_1_PI),
+            residual: self.colours.spread(&residual).map(|r| if r > 0.0 { r } else { 0.0 }),
+            iterations,
+            channels: C,
+        })
+    }
 }

@@ -151,55 +151,61 @@ impl Shadows {
         );
         // The tree's shape must not show in the result.
         self.found.sort_unstable();
-        self.add_found(observer, frame, polygon, reach, active);
+        for k in 0..self.found.len() {
+            let index = self.found[k];
+            active.extend(self.try_add(observer, frame, polygon, index, reach));
+        }
     }
 
-    /// As [`Shadows::find`], with occluders that are known to be the only candidates.
+    /// No shadow.
+    pub const NONE: u32 = u32::MAX;
+
+    /// As [`Shadows::find`], with occluders that are known to be the only candidates: the number of
+    /// the shadow of each, or [`Shadows::NONE`], goes to `numbers`.
     pub fn cast(
         &mut self,
         observer: &Observer,
         frame: &Frame,
         polygon: &[DVec2],
-        candidates: impl Iterator<Item = u32>,
-        active: &mut Vec<u32>,
+        candidates: &[u32],
+        numbers: &mut Vec<u32>,
     ) {
         self.shadows.clear();
         self.lines.clear();
         self.corners.clear();
-        self.found.clear();
-        self.found.extend(candidates.map(|i| i as usize));
         self.foot = frame.project(observer.point);
         let distance = |&x: &DVec2| frame.lift(x).distance(observer.point);
         let reach = polygon.iter().map(distance).fold(0.0, f64::max);
-        self.add_found(observer, frame, polygon, reach, active);
+        for &index in candidates {
+            let number = self.try_add(observer, frame, polygon, index as usize, reach);
+            numbers.push(number.unwrap_or(Self::NONE));
+        }
     }
 
-    fn add_found(
+    /// Adds the shadow of an occluder that may shade the polygon; its number.
+    fn try_add(
         &mut self,
         observer: &Observer,
         frame: &Frame,
         polygon: &[DVec2],
+        index: usize,
         reach: f64,
-        active: &mut Vec<u32>,
-    ) {
+    ) -> Option<u32> {
         let tau = observer.occluders.coincidence();
-        for k in 0..self.found.len() {
-            let index = self.found[k];
-            if observer.cannot_be_shaded_by(index)
-                || observer.occluders.corners(index).iter().all(|&w| frame.height(w) <= tau)
-            {
-                continue;
-            }
-            self.add(observer, frame, index, reach);
-            if self.misses(self.shadows.len() - 1, polygon) {
-                if let Some(shadow) = self.shadows.pop() {
-                    self.lines.truncate(shadow.begin);
-                    self.corners.truncate(shadow.first);
-                }
-            } else {
-                active.push(self.shadows.len() as u32 - 1);
-            }
+        if observer.cannot_be_shaded_by(index)
+            || observer.occluders.corners(index).iter().all(|&w| frame.height(w) <= tau)
+        {
+            return None;
         }
+        self.add(observer, frame, index, reach);
+        let number = self.shadows.len() - 1;
+        if self.misses(number, polygon) {
+            let shadow = self.shadows.pop()?;
+            self.lines.truncate(shadow.begin);
+            self.corners.truncate(shadow.first);
+            return None;
+        }
+        Some(number as u32)
     }
 
     fn add(&mut self, observer: &Observer, frame: &Frame, index: usize, reach: f64) {
