@@ -106,6 +106,9 @@ impl Session {
         for (name, count) in &light.counts {
             report.count(name, *count as usize);
         }
+        for (name, seconds) in &light.seconds {
+            report.value(name, *seconds);
+        }
         report.value("operator bytes", light.bytes as f64);
         report.value("operator bytes forecast", light.forecast as f64);
         report.value("smallest row sum", light.row_sums.0);

@@ -108,6 +108,10 @@ impl Linker {
         columns.resize(begin + 3 * n, 0.0);
         for (i, &point) in points.iter().enumerate() {
             let view = View::new(other, point, own.n);
+            // In the source's plane, where cells meet it, nothing is received.
+            if view.d <= stage.occluders.coincidence() {
+                continue;
+            }
             let horizon = view.horizon(stage.occluders.magnitude);
             let corners = &source.corners;
             let moments = near::moments(&view, &horizon, corners, &self.precision, &mut self.clip);

@@ -121,6 +121,14 @@ impl<'a> Operator<'a> {
         }
     }
 
+    /// Seconds of all threads that its parts took, by name, for the report.
+    pub fn seconds(&self) -> Vec<(&'static str, f64)> {
+        match self {
+            Operator::Fast(operator) => operator.named_seconds(),
+            Operator::Exact(_) | Operator::Clustered(_) => vec![],
+        }
+    }
+
     /// Sums of the rows over pi: the share of the hemisphere that is filled by radiating surfaces,
     /// 1 in a closed scene.
     pub fn row_sums(&self, nodes: usize) -> Vec<f64> {

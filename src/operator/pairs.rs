@@ -98,6 +98,8 @@ pub struct Rules<'a> {
     pub allowed: f64,
     /// Receivers of at most this many levels take fully visible clusters as links where they may.
     pub link_levels: u32,
+    /// Most pairs of elements that are linked rather than taken as far.
+    pub few_links: usize,
     /// Which roots radiate.
     pub sends: &'a [bool],
 }
@@ -280,7 +282,9 @@ impl<R: Receiver> Descent<'_, '_, R> {
             // The fit is integrated exactly: only the receiver is small.
             let by_fit =
                 may_link && receiver.radius <= self.rules.eta_of_one * (distance - cell.radius);
-            if by_fit || receiver.radius + cell.radius <= self.rules.eta * distance {
+            let few = 1 << (2 * (receiver.level + cell.level).min(16)) <= self.rules.few_links;
+            let far = receiver.radius + cell.radius <= self.rules.eta * distance;
+            if by_fit || (far && !few) {
                 self.counts.far += 1;
                 self.out.far(receiver, cell, by_fit);
                 return;
@@ -289,7 +293,8 @@ impl<R: Receiver> Descent<'_, '_, R> {
             self.pending.sources.push(source);
             return;
         }
-        if cell.level > 0 && (cell.radius >= receiver.radius || receiver.level == 0) {
+        let few = clear && above && receiver.level <= self.rules.link_levels;
+        if cell.level > 0 && (cell.radius >= receiver.radius || receiver.level == 0 || few) {
             for k in 0..4 {
                 let cell = cell.child(self.stage, k);
                 self.settle(receiver, &Source { cell, between });

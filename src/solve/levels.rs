@@ -25,7 +25,7 @@ const STEP: u32 = 2;
 const COARSEST: usize = 1000;
 
 /// A coarse solution may be this much less accurate.
-const LOOSER: f64 = 3.0;
+const LOOSER: f64 = 10.0;
 
 /// Deviations of a solution may be this many times those that its operator was built for.
 const SURPRISE: f64 = 2.0;

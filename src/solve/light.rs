@@ -51,6 +51,8 @@ pub struct Light {
     pub bytes: usize,
     /// What its rows met, by name.
     pub counts: Vec<(&'static str, u64)>,
+    /// Seconds of all threads that parts of the operator took, by name.
+    pub seconds: Vec<(&'static str, f64)>,
     /// Smallest and largest sum of a row over pi: 1 where a node sees radiating sides all around.
     /// Of the fast operator, rows are those of surfaces that reflect, and dark sides are left out.
     pub row_sums: (f64, f64),
@@ -99,6 +101,7 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
         entries: operator.entries(),
         bytes: operator.bytes(),
         counts,
+        seconds: operator.seconds(),
         row_sums,
         clusters,
         mesh,

@@ -34,7 +34,7 @@ use crate::monitor::Monitor;
 pub use options::{Demand, FastOptions};
 
 /// Links of this precision or looser are kept in f32.
-const SINGLE_FROM: f64 = 1e-7;
+const SINGLE_FROM: f64 = 1e-8;
 
 /// Levels of the clusters whose rows one task builds: 256 elements.
 const TASK_LEVEL: u32 = 4;
@@ -125,15 +125,17 @@ impl<'a> FastOperator<'a> {
             allowed: max_memory,
             mesh,
         };
-        // Links of a few nodes against a matrix: about as many numbers.
+        // Integrals of links cost about twenty times as much as entries of a matrix.
         let n = interpolation.count();
+        let link_levels = (0..8).take_while(|l| mesh.basis.nodes() << (2 * l) <= n).count() as u32;
         let rules = Rules {
             eta: demand.eta,
             // What eta leaves each of two clusters of one size.
             eta_of_one: demand.eta / (2.0 - demand.eta),
             deviation: demand.deviation,
             allowed: demand.allowed,
-            link_levels: if n * n > 400 { 1 } else { 0 },
+            link_levels: link_levels.saturating_sub(1),
+            few_links: n * n / 20 / mesh.basis.nodes(),
             sends: demand.sends,
         };
         let single = demand.precision >= SINGLE_FROM;
@@ -286,6 +288,16 @@ impl<'a> FastOperator<'a> {
             ("far field bytes", self.far_bytes() as u64),
             ("links", self.links() as u64),
             ("link bytes", self.link_bytes() as u64),
+        ]
+    }
+
+    /// Seconds that the parts took, by name.
+    pub fn named_seconds(&self) -> Vec<(&'static str, f64)> {
+        let Seconds { far, links, all } = self.seconds;
+        vec![
+            ("far field seconds", far),
+            ("link seconds", links),
+            ("pair seconds", all - far - links),
         ]
     }
 
