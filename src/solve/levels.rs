@@ -54,10 +54,19 @@ pub struct FastSolved<'a> {
     pub solution: Solution,
     /// Roots whose irradiance is known: those that reflect what reaches them, and their patches.
     pub receives: Vec<bool>,
-    /// Roots that send out light.
-    pub sends: Vec<bool>,
-    /// How often the operator was built.
-    pub builds: u64,
+    /// What was left out and done again, by name.
+    pub counts: Vec<(&'static str, u64)>,
+}
+
+/// Which roots take part.
+struct Active {
+    /// They send out light.
+    sends: Vec<bool>,
+    /// Their irradiance is needed.
+    receives: Vec<bool>,
+    /// How many reflect nothing, and how many others no light reaches.
+    black: u64,
+    dark: u64,
 }
 
 /// What is expected of a solution before it is there.
@@ -77,7 +86,7 @@ pub fn solve_fast<'a>(
     monitor: &Monitor,
 ) -> Result<FastSolved<'a>> {
     let Stage { mesh, clusters, .. } = stage;
-    let (sends, receives) = active(stage, reflectance, exitance);
+    let active = active(stage, reflectance, exitance);
     let mut expected = expect(stage, how, monitor)?;
     let mut builds: u64 = 0;
     loop {
@@ -85,8 +94,8 @@ pub fn solve_fast<'a>(
             &how.fast,
             &expected.deviation,
             expected.largest_irradiance,
-            &sends,
-            &receives,
+            &active.sends,
+            &active.receives,
         );
         let operator = FastOperator::build(stage, &demand, how.max_memory, monitor)?;
         let operator = Operator::Fast(Box::new(operator));
@@ -99,7 +108,12 @@ pub fn solve_fast<'a>(
         let Operator::Fast(fast) = &operator else { unreachable!("made above") };
         let allowed = SURPRISE * 0.25 * how.fast.tolerance * largest;
         if fast.largest_link_error(&deviation) <= allowed || builds > MOST_REPEATS {
-            return Ok(FastSolved { operator, solution, receives, sends, builds });
+            let counts = vec![
+                ("operator builds", builds),
+                ("roots that reflect nothing", active.black),
+                ("roots that no light reaches", active.dark),
+            ];
+            return Ok(FastSolved { operator, solution, receives: active.receives, counts });
         }
         let larger = |(a, b): (f64, &f64)| a.max(*b);
         expected = Expected {
@@ -114,8 +128,7 @@ fn largest_irradiance(solution: &Solution) -> f64 {
     solution.irradiance.iter().map(|h| h.max_element()).fold(0.0, f64::max)
 }
 
-/// Which roots send and which receive.
-fn active(stage: Stage, reflectance: &[DVec3], exitance: &[DVec3]) -> (Vec<bool>, Vec<bool>) {
+fn active(stage: Stage, reflectance: &[DVec3], exitance: &[DVec3]) -> Active {
     let mesh = stage.mesh;
     let any = |values: &[DVec3]| -> Vec<bool> {
         mesh.roots
@@ -136,7 +149,9 @@ fn active(stage: Stage, reflectance: &[DVec3], exitance: &[DVec3]) -> (Vec<bool>
         patches[root.patch as usize] |= reflects[r] && sends[r];
     }
     let receives = mesh.roots.iter().map(|root| patches[root.patch as usize]).collect();
-    (sends, receives)
+    let black = reflects.iter().filter(|r| !**r).count() as u64;
+    let dark = reflects.iter().zip(&sends).filter(|(r, s)| **r && !**s).count() as u64;
+    Active { sends, receives, black, dark }
 }
 
 /// What a coarser mesh tells of the solution.

@@ -66,22 +66,22 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     let (reflectance, exitance) = mesh::appearance(scene, &mesh);
     let clusters = Clusters::build(&mesh);
     let stage = Stage { mesh: &mesh, clusters: &clusters, occluders: &occluders };
-    let (operator, solution, receives, builds) = match options.operator {
+    let (operator, solution, receives, left_out) = match options.operator {
         OperatorKind::Fast(fast) => {
             let how =
                 FastSolve { scene, fast, solve: options.solve, max_memory: options.max_memory };
             let solved = solve_fast(stage, &reflectance, &exitance, &how, monitor)?;
-            (solved.operator, solved.solution, solved.receives, solved.builds)
+            (solved.operator, solved.solution, solved.receives, solved.counts)
         }
         kind => {
             let operator = Operator::build(stage, kind, options.max_memory, monitor)?;
             let solution =
                 solve(&operator, &reflectance, &exitance, None, &options.solve, monitor)?;
-            (operator, solution, vec![true; mesh.roots.len()], 1)
+            (operator, solution, vec![true; mesh.roots.len()], vec![])
         }
     };
     let mut counts = operator.counts();
-    counts.push(("operator builds", builds));
+    counts.extend(left_out);
     counts.push(("channels solved", solution.channels as u64));
     let sums = operator.row_sums(mesh.nodes());
     let row_sums = sums
