@@ -103,13 +103,14 @@ fn gathering_finds_what_interpolation_does() {
 fn a_furnace_is_seen_exactly() {
     let room = tempfile::tempdir().unwrap();
     for options in ["", "--gather", "--samples 3", "--basis constant", "--subdivide 2"] {
-        succeeds(
-            room.path(),
-            &format!("render scenes/furnace.gltf -o view.exr --size 48x48 {options}"),
-        );
-        // E = 1 and rho = 1/2: u = E/(1 - rho) = 2, and radiance is u/pi.
-        for value in Exr::read(&room.path().join("view.exr")).pixels.iter().flatten() {
-            assert!((f64::from(*value) - 2.0 / PI).abs() < 1e-6, "{options}: {value}");
+        // The default operator is good to 1e-4.
+        for (operator, tolerance) in [("exact", 1e-6), ("fast", 1e-4)] {
+            let words = format!("--size 48x48 --operator {operator} {options}");
+            succeeds(room.path(), &format!("render scenes/furnace.gltf -o view.exr {words}"));
+            // E = 1 and rho = 1/2: u = E/(1 - rho) = 2, and radiance is u/pi.
+            for value in Exr::read(&room.path().join("view.exr")).pixels.iter().flatten() {
+                assert!((f64::from(*value) - 2.0 / PI).abs() < tolerance, "{words}: {value}");
+            }
         }
     }
 }
@@ -117,7 +118,31 @@ fn a_furnace_is_seen_exactly() {
 #[test]
 fn the_report_says_what_was_done_and_how_well() {
     let room = tempfile::tempdir().unwrap();
-    succeeds(room.path(), &format!("render scenes/room.gltf -o v.png {COARSE} --report r.json"));
+    let words = format!("render scenes/room.gltf -o v.png {COARSE} --report r.json");
+    succeeds(room.path(), &words);
+    let fast = json(&room.path().join("r.json"));
+    // The fast operator: what was left out, and what its parts took.
+    for name in [
+        "pairs behind each other",
+        "pairs hidden",
+        "pairs clear of occluders",
+        "far pairs",
+        "far field bytes",
+        "links",
+        "link bytes",
+        "roots that reflect nothing",
+        "roots that no light reaches",
+        "channels solved",
+    ] {
+        assert!(fast["counts"][name].is_u64(), "{name}");
+    }
+    for name in ["far field seconds", "link seconds", "pair seconds"] {
+        assert!(fast["values"][name].as_f64().unwrap() > 0.0, "{name}");
+    }
+    for sum in ["smallest row sum", "largest row sum"] {
+        assert!((fast["values"][sum].as_f64().unwrap() - 1.0).abs() < 1e-4, "{sum}");
+    }
+    succeeds(room.path(), &format!("{words} --operator exact"));
     let report = json(&room.path().join("r.json"));
     assert_eq!(report["command"], "render");
     let stages: Vec<&str> =

@@ -110,7 +110,9 @@ impl Session {
             report.value(name, *seconds);
         }
         report.value("operator bytes", light.bytes as f64);
-        report.value("operator bytes forecast", light.forecast as f64);
+        if let Some(bytes) = light.forecast {
+            report.value("operator bytes forecast", bytes as f64);
+        }
         report.value("smallest row sum", light.row_sums.0);
         report.value("largest row sum", light.row_sums.1);
         report.channels("residual", light.solution.residual.to_array());

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::levels::{FastSolve, solve_fast};
 use super::{Solution, SolveOptions, solve};
 use crate::cluster::Clusters;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mesh::{self, Mesh, MeshOptions};
 use crate::monitor::Monitor;
 use crate::operator::clustered::ClusteredSource;
@@ -13,6 +13,9 @@ use crate::operator::walk::{Stage, Walker, gather};
 use crate::operator::{Operator, OperatorKind};
 use crate::scene::Scene;
 use crate::visibility::Occluders;
+
+/// From so many roots on, memory is forecast before the fast operator is built.
+const FORECAST_FROM: usize = 2000;
 
 /// How a scene is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,8 +46,8 @@ pub struct Light {
     pub solution: Solution,
     /// The radiosity made ready for clustered gathering, where the operator was clustered.
     pub clustered: Option<ClusteredSource>,
-    /// Bytes that were forecast for the operator before it was built.
-    pub forecast: u64,
+    /// Bytes that were forecast for the operator before it was built, where that was done.
+    pub forecast: Option<u64>,
     /// Pairs of a node and an element that the operator stores.
     pub entries: usize,
     /// Bytes that the operator took.
@@ -66,6 +69,24 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     let (reflectance, exitance) = mesh::appearance(scene, &mesh);
     let clusters = Clusters::build(&mesh);
     let stage = Stage { mesh: &mesh, clusters: &clusters, occluders: &occluders };
+    // The fast operator keeps count of its memory as it grows: a forecast is worth its time where
+    // that would take long.
+    let fast = matches!(options.operator, OperatorKind::Fast(_));
+    let forecast = (!fast || mesh.roots.len() > FORECAST_FROM)
+        .then(|| Operator::forecast(stage, options.operator));
+    if let Some(bytes) = forecast
+        && fast
+        && bytes > options.max_memory
+    {
+        return Err(Error::Memory {
+            what: format!("the operator of {} elements", mesh.elements()),
+            needed: bytes,
+            allowed: options.max_memory,
+            remedy: "choose a larger --operator-tolerance, a scene of fewer faces, or raise \
+                     --max-memory"
+                .into(),
+        });
+    }
     let (operator, solution, receives, left_out) = match options.operator {
         OperatorKind::Fast(fast) => {
             let how =
@@ -97,7 +118,7 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     };
     Ok(Light {
         clustered,
-        forecast: Operator::forecast(stage, options.operator),
+        forecast,
         entries: operator.entries(),
         bytes: operator.bytes(),
         counts,
