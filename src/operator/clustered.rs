@@ -11,11 +11,11 @@ use std::mem::size_of;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::walk::{Counts, Scope, Seen, Stage, Walker, exact_entry};
+use super::walk::{Counts, Rule, Scope, Seen, Stage, Walker, exact_entry};
 use crate::error::{Error, Result};
 use crate::far::{ClusterMoments, MOST_ORDER, far_sum};
 use crate::geometry::Pieces;
-use crate::kernel::View;
+use crate::kernel::{Precision, View};
 use crate::monitor::Monitor;
 
 /// Rows that one task builds.
@@ -171,7 +171,7 @@ pub fn forecast(stage: Stage, eta: f64) -> FieldForecast {
             walker.counts = Counts::default();
             let (point, normal) = stage.mesh.node(node);
             let mut list = FarList::default();
-            walker.cover(stage, point, normal, eta, |scope, seen| {
+            walker.cover(stage, point, normal, Rule::Far(eta), |scope, seen| {
                 if let Seen::Far(cluster) = seen {
                     list.push(0, scope.index, cluster);
                 }
@@ -204,7 +204,7 @@ pub fn field_sizes(stage: Stage, eta: f64, monitor: &Monitor) -> Result<FieldSiz
             for node in start..end {
                 walker.counts = Counts::default();
                 let (point, normal) = stage.mesh.node(node);
-                walker.cover(stage, point, normal, eta, |_, _| {});
+                walker.cover(stage, point, normal, Rule::Far(eta), |_, _| {});
                 sizes = sizes.or_larger(sizes_of(&walker.counts));
             }
             Ok(sizes)
@@ -301,11 +301,17 @@ impl<'a> ClusteredOperator<'a> {
                             found.clear();
                             run = 0;
                             let eta = self.options.eta;
-                            walker.cover(self.stage, point, normal, eta, |scope, seen| {
-                                if let Seen::Far(cluster) = seen {
-                                    found.push(0, scope.index, cluster);
-                                }
-                            });
+                            walker.cover(
+                                self.stage,
+                                point,
+                                normal,
+                                Rule::Far(eta),
+                                |scope, seen| {
+                                    if let Seen::Far(cluster) = seen {
+                                        found.push(0, scope.index, cluster);
+                                    }
+                                },
+                            );
                             (&*found, 0..found.faces.len())
                         }
                     };
@@ -371,10 +377,12 @@ impl ClusteredSource {
         let basis = stage.mesh.basis;
         let (mut clip, mut far) = (Pieces::default(), FarList::default());
         let mut sum = [0.0; 3];
-        walker.cover(stage, point, normal, self.options.eta, |scope, seen| {
+        walker.cover(stage, point, normal, Rule::Far(self.options.eta), |scope, seen| {
             if let Seen::Far(cluster) = seen {
                 far.push(0, scope.index, cluster);
-            } else if let Some((element, c)) = exact_entry(scope, seen, basis, &mut clip) {
+            } else if let Some((element, c)) =
+                exact_entry(scope, seen, basis, &Precision::EXACT, &mut clip)
+            {
                 let values = &self.values[element as usize * basis.nodes()..];
                 for (c, value) in c.iter().zip(&values[..basis.nodes()]) {
                     for (s, v) in sum.iter_mut().zip(value) {
@@ -407,12 +415,14 @@ fn chunk(
         walker.counts = Counts::default();
         let (point, normal) = stage.mesh.node(node);
         let row = chunk.far.faces.len();
-        walker.cover(stage, point, normal, eta, |scope: &Scope, seen| {
+        walker.cover(stage, point, normal, Rule::Far(eta), |scope: &Scope, seen| {
             if let Seen::Far(cluster) = seen {
                 if kept == Kept::All {
                     chunk.far.push(row, scope.index, cluster);
                 }
-            } else if let Some((element, c)) = exact_entry(scope, seen, basis, clip) {
+            } else if let Some((element, c)) =
+                exact_entry(scope, seen, basis, &Precision::EXACT, clip)
+            {
                 chunk.elements.push(element);
                 chunk.coefficients.extend_from_slice(&c[..basis.nodes()]);
             }

@@ -98,6 +98,52 @@ pub struct Scope<'a> {
     pub horizon: Linear,
 }
 
+/// Which clusters a covering may take whole.
+#[derive(Clone, Copy)]
+pub enum Rule<'a> {
+    /// None: elements alone.
+    Exact,
+    /// Fully visible, admissible ones (AC (3.3)) with this eta: its members are [`Seen::Far`].
+    Far(f64),
+    /// Those whose fit is good enough: numbers of [`Seen::Near`] and [`Seen::Gray`] are then those
+    /// of clusters, not of elements.
+    Fit(&'a FitRule),
+}
+
+/// When the fit of a cluster may stand for what it radiates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitRule {
+    /// Root mean square deviation of each cluster's radiosity from its fit, W/m^2.
+    pub deviation: Vec<f64>,
+    /// Largest product of deviation and form factor, W/m^2.
+    pub allowed: f64,
+}
+
+impl FitRule {
+    /// Whether a cluster with this centre (in its plane), radius and corners may be taken whole.
+    fn allows(
+        &self,
+        cluster: u32,
+        view: &View,
+        centre: DVec2,
+        radius: f64,
+        t: &[DVec2; 3],
+    ) -> bool {
+        let deviation = self.deviation[cluster as usize];
+        if deviation <= self.allowed {
+            return true;
+        }
+        let distance = ((centre - view.foot).length_squared() + view.d * view.d).sqrt() - radius;
+        if distance <= 0.0 {
+            return false;
+        }
+        let area = 0.5 * (t[1] - t[0]).perp_dot(t[2] - t[0]);
+        let cosine = (view.d / distance).min(1.0);
+        let factor = area * cosine / (std::f64::consts::PI * distance * distance);
+        deviation * factor.min(1.0) <= self.allowed
+    }
+}
+
 /// Something that a point sees: the members of its minimal admissible covering.
 pub enum Seen<'a> {
     /// A fully visible, admissible cluster above the horizon.
@@ -124,14 +170,13 @@ impl Walker {
     /// Calls `seen` with each member of the unique minimal admissible covering of the surface, as
     /// seen from `point` with unit `normal`, that is not hidden, face by face in ascending order.
     ///
-    /// A cluster is far when it is admissible with `eta` (AC (3.3)), wholly above the horizon and
-    /// proved fully visible. With eta = 0 nothing is far: the exact row.
+    /// A cluster is far when it is admissible, wholly above the horizon and proved fully visible.
     pub fn cover(
         &mut self,
         stage: Stage,
         point: DVec3,
         normal: DVec3,
-        eta: f64,
+        rule: Rule,
         mut seen: impl FnMut(&Scope, Seen),
     ) {
         let Stage { mesh, clusters, occluders } = stage;
@@ -164,7 +209,7 @@ impl Walker {
                 let r = &mesh.roots[root as usize];
                 let radius = clusters.root_radius[root as usize];
                 let place = Place { root, depth: 0, level: r.level, index: 0, radius };
-                self.descend(stage, &scope, place, &r.corners, eta, 0, &mut seen);
+                self.descend(stage, &scope, place, &r.corners, rule, 0, &mut seen);
             }
         }
     }
@@ -177,7 +222,7 @@ impl Walker {
         scope: &Scope,
         place: Place,
         corners: &[DVec2; 3],
-        eta: f64,
+        rule: Rule,
         from: usize,
         seen: &mut impl FnMut(&Scope, Seen),
     ) {
@@ -190,9 +235,19 @@ impl Walker {
             return;
         }
         let clear = self.active.len() == to;
-        let element = || stage.mesh.roots[place.root as usize].first + place.index;
-        if clear && eta > 0.0 {
-            let number = stage.clusters.number(place.root as usize, place.depth, place.index);
+        let number = || stage.clusters.number(place.root as usize, place.depth, place.index);
+        let mut whole = place.level == 0;
+        if let Rule::Fit(fit) = rule {
+            let (number, view) = (number(), &scope.view);
+            let centre = stage.clusters.centre[number as usize];
+            whole |= fit.allows(number, view, centre, place.radius, corners);
+        }
+        let name = || match rule {
+            Rule::Fit(_) => number(),
+            _ => stage.mesh.roots[place.root as usize].first + place.index,
+        };
+        if let (true, Rule::Far(eta)) = (clear, rule) {
+            let number = number();
             let to_centre = stage.clusters.centre[number as usize] - scope.view.foot;
             let distance_squared = to_centre.length_squared() + scope.view.d * scope.view.d;
             if admissible(place.radius, eta, distance_squared)
@@ -203,7 +258,7 @@ impl Walker {
                 return;
             }
         }
-        if place.level > 0 {
+        if !whole {
             for k in 0..4 {
                 let below = Place {
                     depth: place.depth + 1,
@@ -212,18 +267,18 @@ impl Walker {
                     radius: 0.5 * place.radius,
                     ..place
                 };
-                self.descend(stage, scope, below, &child(corners, k as usize), eta, to, seen);
+                self.descend(stage, scope, below, &child(corners, k as usize), rule, to, seen);
             }
         } else if clear {
             self.counts.near += 1;
-            seen(scope, Seen::Near(element(), corners));
+            seen(scope, Seen::Near(name(), corners));
         } else {
             let pieces = self.shadows.visible(corners, &self.active[to..]);
             if pieces.is_empty() {
                 self.counts.hidden += 1;
             } else {
                 self.counts.gray += 1;
-                seen(scope, Seen::Gray(element(), corners, pieces));
+                seen(scope, Seen::Gray(name(), corners, pieces));
             }
         }
         self.active.truncate(to);
@@ -240,8 +295,9 @@ impl Walker {
     ) {
         let basis = stage.mesh.basis;
         let mut clip = std::mem::take(&mut self.clip);
-        self.cover(stage, point, normal, 0.0, |scope, seen| {
-            if let Some((element, c)) = exact_entry(scope, seen, basis, &mut clip) {
+        self.cover(stage, point, normal, Rule::Exact, |scope, seen| {
+            let exact = &Precision::EXACT;
+            if let Some((element, c)) = exact_entry(scope, seen, basis, exact, &mut clip) {
                 entry(element, c);
             }
         });
@@ -249,25 +305,24 @@ impl Walker {
     }
 }
 
-/// Element and exact coefficients of a near or gray member of a covering; `None` for a far one,
+/// Element (or cluster) and coefficients of a near or gray member of a covering; `None` for a far one,
 /// and where nothing lies above the horizon.
 pub fn exact_entry(
     scope: &Scope,
     seen: Seen,
     basis: Basis,
+    precision: &Precision,
     clip: &mut Pieces,
 ) -> Option<(u32, [f64; 3])> {
     let (element, corners, moments) = match seen {
         Seen::Far(_) => return None,
-        Seen::Near(e, corners) => (
-            e,
-            corners,
-            near::moments(&scope.view, &scope.horizon, corners, &Precision::EXACT, clip),
-        ),
+        Seen::Near(e, corners) => {
+            (e, corners, near::moments(&scope.view, &scope.horizon, corners, precision, clip))
+        }
         Seen::Gray(e, corners, pieces) => (
             e,
             corners,
-            gray::moments(&scope.view, &scope.horizon, corners, pieces, &Precision::EXACT, clip),
+            gray::moments(&scope.view, &scope.horizon, corners, pieces, precision, clip),
         ),
     };
     (moments != Moments::default()).then(|| (element, near::coefficients(moments, corners, basis)))

@@ -106,7 +106,7 @@ pub fn solve_fast<'a>(
         let deviation = deviations(mesh, clusters, &values);
         let largest = largest_irradiance(&solution);
         let Operator::Fast(fast) = &operator else { unreachable!("made above") };
-        let allowed = SURPRISE * 0.25 * how.fast.tolerance * largest;
+        let allowed = SURPRISE * how.fast.allowed(largest);
         if fast.largest_link_error(&deviation) <= allowed || builds > MOST_REPEATS {
             let counts = vec![
                 ("operator builds", builds),
@@ -124,7 +124,8 @@ pub fn solve_fast<'a>(
     }
 }
 
-fn largest_irradiance(solution: &Solution) -> f64 {
+/// Largest irradiance at a node, of all channels.
+pub fn largest_irradiance(solution: &Solution) -> f64 {
     solution.irradiance.iter().map(|h| h.max_element()).fold(0.0, f64::max)
 }
 

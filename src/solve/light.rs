@@ -2,13 +2,14 @@
 
 use glam::DVec3;
 
-use super::levels::{FastSolve, solve_fast};
+use super::levels::{FastSolve, largest_irradiance, solve_fast};
 use super::{Solution, SolveOptions, solve};
 use crate::cluster::Clusters;
 use crate::error::{Error, Result};
 use crate::mesh::{self, Mesh, MeshOptions};
 use crate::monitor::Monitor;
 use crate::operator::clustered::ClusteredSource;
+use crate::operator::fast::FitSource;
 use crate::operator::walk::{Stage, Walker, gather};
 use crate::operator::{Operator, OperatorKind};
 use crate::scene::Scene;
@@ -44,8 +45,8 @@ pub struct Light {
     pub exitance: Vec<DVec3>,
     /// Radiosity and irradiance at the nodes.
     pub solution: Solution,
-    /// The radiosity made ready for clustered gathering, where the operator was clustered.
-    pub clustered: Option<ClusteredSource>,
+    /// The radiosity made ready for gathering as the operator does.
+    source: Source,
     /// Bytes that were forecast for the operator before it was built, where that was done.
     pub forecast: Option<u64>,
     /// Pairs of a node and an element that the operator stores.
@@ -59,6 +60,13 @@ pub struct Light {
     /// Smallest and largest sum of a row over pi: 1 where a node sees radiating sides all around.
     /// Of the fast operator, rows are those of surfaces that reflect, and dark sides are left out.
     pub row_sums: (f64, f64),
+}
+
+/// A solution as points gather it.
+enum Source {
+    Exact,
+    Fits(FitSource),
+    Clustered(ClusteredSource),
 }
 
 /// Meshes a scene, builds the operator and solves for its light.
@@ -110,14 +118,19 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
         .enumerate()
         .filter(|(node, _)| receives[mesh.element_root[node / mesh.basis.nodes()] as usize])
         .fold((f64::MAX, f64::MIN), |(a, b), (_, &s)| (a.min(s), b.max(s)));
-    let clustered = match options.operator {
-        OperatorKind::Exact | OperatorKind::Fast(_) => None,
+    let radiosity = &solution.radiosity;
+    let source = match options.operator {
+        OperatorKind::Exact => Source::Exact,
+        OperatorKind::Fast(fast) => {
+            let largest = largest_irradiance(&solution);
+            Source::Fits(FitSource::new(stage, &fast, radiosity, largest))
+        }
         OperatorKind::Clustered(clustering) => {
-            Some(ClusteredSource::new(stage, clustering, &solution.radiosity))
+            Source::Clustered(ClusteredSource::new(stage, clustering, radiosity))
         }
     };
     Ok(Light {
-        clustered,
+        source,
         forecast,
         entries: operator.entries(),
         bytes: operator.bytes(),
@@ -140,11 +153,12 @@ impl Light {
     }
 
     /// Irradiance at a point with a unit normal, by gathering the solution with exact visibility,
-    /// and with the clustering of the operator where it was clustered.
+    /// and with the clusters of the operator where it had any.
     pub fn irradiance(&self, walker: &mut Walker, point: DVec3, normal: DVec3) -> DVec3 {
-        match &self.clustered {
-            Some(source) => source.gather(walker, self.stage(), point, normal),
-            None => gather(walker, self.stage(), &self.solution.radiosity, point, normal),
+        match &self.source {
+            Source::Fits(source) => source.gather(walker, self.stage(), point, normal),
+            Source::Clustered(source) => source.gather(walker, self.stage(), point, normal),
+            Source::Exact => gather(walker, self.stage(), &self.solution.radiosity, point, normal),
         }
     }
 }

@@ -9,6 +9,7 @@
 
 mod collect;
 pub mod forecast;
+mod gather;
 mod options;
 mod slots;
 mod store;
@@ -31,6 +32,7 @@ use crate::kernel::Precision;
 use crate::mesh::{Mesh, Root};
 use crate::monitor::Monitor;
 
+pub use gather::FitSource;
 pub use options::{Demand, FastOptions};
 
 /// Links of this precision or looser are kept in f32.

@@ -57,6 +57,17 @@ impl FastOptions {
         self.order.unwrap_or(by_tolerance.min(MOST_INTERPOLATION_ORDER))
     }
 
+    /// Largest product of deviation and form factor in a link. The errors of a node's links have
+    /// either sign: a quarter of the tolerance for each has been enough for all (tests measure it).
+    pub fn allowed(&self, largest_irradiance: f64) -> f64 {
+        0.25 * self.tolerance * largest_irradiance
+    }
+
+    /// Precision of the integrals of links, relative to area/distance^2.
+    pub fn precision(&self) -> f64 {
+        0.1 * self.tolerance
+    }
+
     /// The eta in use.
     pub fn eta(&self) -> f64 {
         self.eta.unwrap_or(0.5)
@@ -83,8 +94,7 @@ pub struct Demand<'a> {
 }
 
 impl<'a> Demand<'a> {
-    /// Half the tolerance is for the far field, half for links. The errors of a node's links have
-    /// either sign: a quarter of the tolerance for each has been enough for all (tests measure it).
+    /// Half the tolerance is for the far field, half for links.
     pub fn new(
         options: &FastOptions,
         deviation: &'a [f64],
@@ -96,8 +106,8 @@ impl<'a> Demand<'a> {
             order: options.order(),
             eta: options.eta(),
             deviation,
-            allowed: 0.25 * options.tolerance * largest_irradiance,
-            precision: 0.1 * options.tolerance,
+            allowed: options.allowed(largest_irradiance),
+            precision: options.precision(),
             sends,
             receives,
         }
