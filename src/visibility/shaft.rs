@@ -7,8 +7,9 @@
 //!
 //! D(P, Q) = det(w - P, w' - P, Q - P) = (w - P) x (w' - w) . (Q - P)
 //!
-//! is linear in P and linear in Q, so that a sign which it has at the nine pairs of corners it has
-//! at all pairs of points.
+//! is linear in P and linear in Q, so that a sign which it has at all pairs of corners it has at all
+//! pairs of points. Where the occluder's plane cuts a triangle, corners above it are paired with
+//! corners below it: the section of the shaft with the plane is the hull of their crossings.
 
 use std::cell::OnceCell;
 
@@ -29,12 +30,11 @@ enum Meeting {
     Unknown,
 }
 
-/// A half space that holds the shaft: n.x <= c, up to rounding.
+/// A half space that holds the shaft: n.x <= c, with a unit normal, up to rounding.
 #[derive(Clone, Copy, Debug)]
 struct Side {
     n: DVec3,
     c: f64,
-    uncertainty: f64,
 }
 
 /// All segments from a receiving triangle to a source triangle.
@@ -69,10 +69,7 @@ impl<'a> Shaft<'a> {
                 b.meets(hull)
                     && b.support(up) - up.dot(on_receiver) > 0.0
                     && b.support(out) - out.dot(on_source) > 0.0
-                    && self
-                        .sides()
-                        .iter()
-                        .all(|side| -b.support(-side.n) <= side.c + side.uncertainty)
+                    && self.sides().iter().all(|side| -b.support(-side.n) <= side.c)
             },
             |i| {
                 if self.meeting(i) != Meeting::None {
@@ -111,49 +108,53 @@ impl<'a> Shaft<'a> {
         if below(self.normals.0, self.receiver[0]) || below(self.normals.1, self.source[0]) {
             return Meeting::None;
         }
-        let heights = |t: &[DVec3; 3]| t.map(|x| (x - on_plane).dot(n));
-        let (a, b) = (heights(&self.receiver), heights(&self.source));
+        let points = self.points();
+        let heights = points.map(|x| (x - on_plane).dot(n));
         let (above, under) = (|h: &f64| *h >= -tau, |h: &f64| *h <= tau);
-        let (a_above, b_above) = (a.iter().all(above), b.iter().all(above));
-        let (a_under, b_under) = (a.iter().all(under), b.iter().all(under));
-        if (a_above && b_above) || (a_under && b_under) {
+        if heights.iter().all(above) || heights.iter().all(under) {
             return Meeting::None;
         }
-        if continues_flat(self.normals.0, n, &a) {
+        let (a, b) = heights.split_at(3);
+        if continues_flat(self.normals.0, n, a) {
             return Meeting::None;
         }
-        let opposite = (a_above && b_under) || (a_under && b_above);
-        if opposite {
-            // From the receiver the corners run clockwise when it is above: crossing products of
-            // successive corners point inward.
-            let inward = if a_above { -1.0 } else { 1.0 };
-            let reach = self.reach(corners);
-            let mut all = true;
-            for (i, &w) in corners.iter().enumerate() {
-                let edge = corners[(i + 1) % corners.len()] - w;
-                let slack = 2.0 * tau * edge.length() * reach;
-                let (mut any_in, mut any_out) = (false, false);
-                for p in self.receiver {
-                    let normal = inward * (w - p).cross(edge);
-                    for q in self.source {
-                        let d = normal.dot(q - p);
-                        any_in |= d > slack;
-                        any_out |= d < -slack;
-                    }
+        let strictly = |h: &[f64]| h.iter().any(|h| h.abs() > tau);
+        let apart = (a.iter().all(above) && b.iter().all(under))
+            || (a.iter().all(under) && b.iter().all(above));
+        let mut all = apart && strictly(a) && strictly(b);
+        let reach = self.reach(corners);
+        for (i, &w) in corners.iter().enumerate() {
+            let edge = corners[(i + 1) % corners.len()] - w;
+            let slack = 2.0 * tau * edge.length() * reach;
+            let (mut any_in, mut any_out) = (false, false);
+            for (&p, _) in points.iter().zip(&heights).filter(|(_, h)| above(h)) {
+                // Seen from above the corners run counter-clockwise: this points inward.
+                let inward = edge.cross(w - p);
+                for (&q, _) in points.iter().zip(&heights).filter(|(_, h)| under(h)) {
+                    let d = inward.dot(q - p);
+                    any_in |= d > slack;
+                    any_out |= d < -slack;
                 }
-                if !any_in {
-                    return Meeting::None;
+                if any_in && (any_out || !all) {
+                    break;
                 }
-                all &= !any_out;
             }
-            let strictly = |h: &[f64; 3]| h.iter().any(|h| h.abs() > tau);
-            if all && strictly(&a) && strictly(&b) {
-                return Meeting::All;
+            if !any_in {
+                return Meeting::None;
             }
+            all &= !any_out;
         }
-        let outside =
-            |side: &Side| corners.iter().all(|w| side.n.dot(*w) >= side.c - side.uncertainty);
+        if all {
+            return Meeting::All;
+        }
+        let outside = |side: &Side| corners.iter().all(|&w| side.n.dot(w) >= side.c - 2.0 * tau);
         if self.sides().iter().any(outside) { Meeting::None } else { Meeting::Unknown }
+    }
+
+    /// The corners of both triangles.
+    fn points(&self) -> [DVec3; 6] {
+        let ([a, b, c], [d, e, f]) = (self.receiver, self.source);
+        [a, b, c, d, e, f]
     }
 
     /// A bound on all distances between points of the shaft and of an occluder.
@@ -163,6 +164,10 @@ impl<'a> Shaft<'a> {
     }
 
     /// The sides of the hull that hold an edge of one triangle and a corner of the other.
+    ///
+    /// Where these are close together their plane is turned by roundings, tau over their distance.
+    /// So the half space is put where it does hold the whole hull: a separation by it is a proof
+    /// whatever its normal is, to a rounding of coordinates.
     fn sides(&self) -> &[Side] {
         self.sides.get_or_init(|| {
             let hull = Bounds::of(self.receiver.iter().chain(&self.source));
@@ -171,22 +176,22 @@ impl<'a> Shaft<'a> {
             let mut sides = vec![];
             for (own, other) in [(&self.receiver, &self.source), (&self.source, &self.receiver)] {
                 for k in 0..3 {
-                    let (p, q, opposite) = (own[k], own[(k + 1) % 3], own[(k + 2) % 3]);
+                    let (p, edge, opposite) = (own[k], own[(k + 1) % 3] - own[k], own[(k + 2) % 3]);
                     for &corner in other {
-                        let n = (q - p).cross(corner - p);
-                        let (c, uncertainty) = (n.dot(p), 2.0 * tau * (q - p).length() * size);
-                        let beyond = |sign: f64| {
-                            std::iter::once(&opposite)
-                                .chain(other)
-                                .all(|x| sign * (n.dot(*x - p)) <= uncertainty)
-                        };
-                        if n.length() <= uncertainty {
+                        let n = edge.cross(corner - p);
+                        let length = n.length();
+                        let turn = 2.0 * tau * edge.length() / length;
+                        if turn.is_nan() || turn >= 1.0 {
                             continue;
                         }
-                        if beyond(1.0) {
-                            sides.push(Side { n, c, uncertainty });
-                        } else if beyond(-1.0) {
-                            sides.push(Side { n: -n, c: -c, uncertainty });
+                        for n in [n / length, -n / length] {
+                            let height = |x: &DVec3| n.dot(*x - p);
+                            let rest = std::iter::once(&opposite).chain(other);
+                            let highest = rest.map(height).fold(0.0, f64::max);
+                            if highest <= turn * size {
+                                sides.push(Side { n, c: n.dot(p) + highest });
+                                break;
+                            }
                         }
                     }
                 }

@@ -4,12 +4,15 @@ mod found;
 mod look;
 mod oracle;
 mod proofs;
+#[path = "../common/random.rs"]
+mod random;
 mod rays;
 mod scenes;
 
 use glam::DVec3;
 use look::look;
-use scenes::{Random, Sight};
+use random::Random;
+use scenes::Sight;
 
 /// Scales, and distances from the origin in sizes, that change roundings most.
 const PLACES: [(f64, f64); 6] =
