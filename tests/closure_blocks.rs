@@ -1,6 +1,9 @@
 //! Closure of rooms full of things: what a point of them sees adds up to one, whatever touches what.
 
 mod common;
+#[path = "common/random.rs"]
+#[allow(dead_code)]
+mod random;
 #[path = "visibility_area/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;
@@ -11,7 +14,7 @@ use lumel::geometry::Frame;
 use lumel::mesh::{Basis, Refinement};
 use lumel::operator::Walker;
 use lumel::scene::Scene;
-use scenes::Random;
+use random::Random;
 
 /// How a scene is placed in space: scale, shift in sizes, and how near to one the sums must be.
 ///

@@ -180,3 +180,57 @@ fn quadrature_and_closed_form_agree_where_they_meet() {
         assert!(worst < 1e-12, "ratio {ratio}: {worst:e}");
     }
 }
+
+/// Integrals of a lower precision are as good as that: within precision times area/distance^2, and
+/// times the radius in the first moment. Distance and radius are those of `moments`.
+#[test]
+fn lower_precisions_are_met() {
+    let mut random = Random(11);
+    let frame = Frame::new(DVec3::ZERO, DVec3::Z);
+    for precision in [1e-3, 1e-5, 1e-7, 1e-9] {
+        let lower = Precision::within(precision);
+        let (mut tried, mut worst, mut at) = (0, 0.0f64, 0.0);
+        while tried < 20_000 {
+            let corner = |r: &mut Random| DVec2::new(r.between(-1.0, 1.0), r.between(-1.0, 1.0));
+            let mut t = [corner(&mut random), corner(&mut random), corner(&mut random)];
+            // One in four is thin.
+            if random.unit() < 0.25 {
+                let along = t[0].lerp(t[1], random.between(-0.2, 1.2));
+                t[2] = along + (t[2] - along) * 10f64.powf(random.between(-4.0, 0.0));
+            }
+            let twice: f64 = (t[1] - t[0]).perp_dot(t[2] - t[0]);
+            if twice < 0.0 {
+                t.swap(1, 2);
+            }
+            let area = 0.5 * twice.abs();
+            let centre = (t[0] + t[1] + t[2]) / 3.0;
+            let radius = t.iter().map(|x| x.distance(centre)).fold(0.0, f64::max);
+            let ratio = 10f64.powf(random.between(-3.0, 3f64.log10()));
+            let distance = radius / ratio;
+            let mut out = random.direction();
+            out.z = out.z.abs();
+            let receiver = centre.extend(0.0) + distance * out;
+            // Every other one looks at the triangle, where G is largest.
+            let at_it = -out;
+            let normal = if tried % 2 == 0 { at_it } else { random.direction() };
+            let above = |x: &DVec2| (x.extend(0.0) - receiver).dot(normal) > 0.0;
+            if !(area > 1e-6 && receiver.z > 1e-3 * distance && t.iter().all(above)) {
+                continue;
+            }
+            tried += 1;
+            let view = View::new(&frame, receiver, normal);
+            let want = moments(&view, &t, centre, &Precision::EXACT);
+            let got = moments(&view, &t, centre, &lower);
+            // And a few roundings of a full hemisphere, which thin triangles lose in the closed form.
+            let scale = precision * area / (distance * distance) + 4e-15;
+            let zeroth = (got.zeroth - want.zeroth).abs() / scale;
+            let first = (got.first - want.first).length() / (scale * radius);
+            if zeroth.max(first) > worst {
+                (worst, at) = (zeroth.max(first), ratio);
+            }
+        }
+        println!("{precision:e}: {worst:.2} of it, at ratio {at:.3}");
+        assert!(worst <= 1.0, "{precision:e}: {worst} times it, at ratio {at}");
+        assert!(worst > 0.01, "{precision:e}: {worst} of it: rules are too long");
+    }
+}

@@ -483,7 +483,7 @@ fn with_own(
 /// The pair turned at random (but for one in four), scaled, and shifted by `far` times its size.
 fn placed(pair: &Pair, seed: u64, (scale, far): (f64, f64)) -> Pair {
     let mut r = Random::new(seed ^ 0xF00D);
-    let turn = if seed % 4 == 0 { glam::DMat3::IDENTITY } else { r.turn() };
+    let turn = if seed.is_multiple_of(4) { glam::DMat3::IDENTITY } else { r.turn() };
     let shift: DVec3 = r.direction() * far * scale;
     let place = |t: &Triangle| t.map(|x| scale * (turn * x) + shift);
     Pair {

@@ -11,6 +11,7 @@ pub mod pairs;
 pub mod reach;
 pub mod walk;
 
+use crate::cluster::fit::Deviation;
 use crate::error::Result;
 use crate::monitor::Monitor;
 
@@ -72,7 +73,7 @@ impl<'a> Operator<'a> {
         Ok(match kind {
             OperatorKind::Fast(options) => {
                 let all = vec![true; stage.mesh.roots.len()];
-                let unknown = vec![f64::INFINITY; stage.clusters.len()];
+                let unknown = vec![Deviation::UNKNOWN; stage.clusters.len()];
                 let demand = Demand::new(&options, &unknown, 0.0, &all, &all);
                 Operator::Fast(Box::new(FastOperator::build(stage, &demand, max_memory, monitor)?))
             }

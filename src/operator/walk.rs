@@ -8,6 +8,7 @@
 
 use glam::{DVec2, DVec3};
 
+use crate::cluster::fit::Deviation;
 use crate::cluster::{Clusters, admissible};
 use crate::geometry::Pieces;
 use crate::geometry::polygon::Linear;
@@ -113,9 +114,9 @@ pub enum Rule<'a> {
 /// When the fit of a cluster may stand for what it radiates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitRule {
-    /// Root mean square deviation of each cluster's radiosity from its fit, W/m^2.
-    pub deviation: Vec<f64>,
-    /// Largest product of deviation and form factor, W/m^2.
+    /// Deviation of each cluster's radiosity from its fit, W/m^2.
+    pub deviation: Vec<Deviation>,
+    /// Largest error that one may make, as [`Deviation::error`] bounds it, W/m^2.
     pub allowed: f64,
 }
 
@@ -129,18 +130,15 @@ impl FitRule {
         radius: f64,
         t: &[DVec2; 3],
     ) -> bool {
-        let deviation = self.deviation[cluster as usize];
-        if deviation <= self.allowed {
-            return true;
-        }
         let distance = ((centre - view.foot).length_squared() + view.d * view.d).sqrt() - radius;
-        if distance <= 0.0 {
-            return false;
-        }
-        let area = 0.5 * (t[1] - t[0]).perp_dot(t[2] - t[0]);
-        let cosine = (view.d / distance).min(1.0);
-        let factor = area * cosine / (std::f64::consts::PI * distance * distance);
-        deviation * factor.min(1.0) <= self.allowed
+        let factor = if distance > 0.0 {
+            let area = 0.5 * (t[1] - t[0]).perp_dot(t[2] - t[0]);
+            let cosine = (view.d / distance).min(1.0);
+            area * cosine / (std::f64::consts::PI * distance * distance)
+        } else {
+            f64::INFINITY
+        };
+        self.deviation[cluster as usize].error(factor) <= self.allowed
     }
 }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::{Solution, SolveOptions, solve};
 use crate::cluster::Clusters;
-use crate::cluster::fit::deviations;
+use crate::cluster::fit::{Deviation, deviations};
 use crate::error::Result;
 use crate::mesh::{self, Mesh};
 use crate::monitor::Monitor;
@@ -72,7 +72,7 @@ struct Active {
 /// What is expected of a solution before it is there.
 struct Expected {
     /// Of each cluster, W/m^2.
-    deviation: Vec<f64>,
+    deviation: Vec<Deviation>,
     largest_irradiance: f64,
     guess: Option<Vec<DVec3>>,
 }
@@ -115,7 +115,7 @@ pub fn solve_fast<'a>(
             ];
             return Ok(FastSolved { operator, solution, receives: active.receives, counts });
         }
-        let larger = |(a, b): (f64, &f64)| a.max(*b);
+        let larger = |(a, b): (Deviation, &Deviation)| a.or_larger(*b);
         expected = Expected {
             deviation: deviation.into_iter().zip(&expected.deviation).map(larger).collect(),
             largest_irradiance: largest,
@@ -159,7 +159,7 @@ fn active(stage: Stage, reflectance: &[DVec3], exitance: &[DVec3]) -> Active {
 fn expect(stage: Stage, how: &FastSolve, monitor: &Monitor) -> Result<Expected> {
     let Stage { mesh, clusters, occluders } = stage;
     let unknown = |n: usize| Expected {
-        deviation: vec![f64::INFINITY; n],
+        deviation: vec![Deviation::UNKNOWN; n],
         largest_irradiance: 0.0,
         guess: None,
     };
@@ -190,23 +190,37 @@ fn expect(stage: Stage, how: &FastSolve, monitor: &Monitor) -> Result<Expected> 
     })
 }
 
-/// Deviations on a finer mesh: those of the coarser one where it has clusters of elements, and half
-/// of the parent's below, as where a shadow line crosses (where all is smooth a quarter is left).
-fn refined(stage: Stage, (coarse, tree): (&Mesh, &Clusters), known: &[f64]) -> Vec<f64> {
+/// Deviations on a finer mesh: those of the coarser one where it has clusters of elements; below,
+/// each level gains as much as the last one known there did: half where a shadow line bends the
+/// light, nothing where light jumps. (Where all is smooth a quarter is left; half is supposed.)
+fn refined(
+    stage: Stage,
+    (coarse, tree): (&Mesh, &Clusters),
+    known: &[Deviation],
+) -> Vec<Deviation> {
     let Stage { mesh, clusters, .. } = stage;
-    let mut deviation = vec![f64::INFINITY; clusters.len()];
+    let mut deviation = vec![Deviation::UNKNOWN; clusters.len()];
     for (root, r) in mesh.roots.iter().enumerate() {
         let known_depths = coarse.roots[root].level;
         if known_depths == 0 {
             continue;
         }
+        let of_coarse = |depth: u32, index: u32| known[tree.number(root, depth, index) as usize];
         for depth in 0..=r.level {
             for index in 0..1u32 << (2 * depth) {
                 let own = clusters.number(root, depth, index) as usize;
                 deviation[own] = if depth < known_depths {
-                    known[tree.number(root, depth, index) as usize]
+                    of_coarse(depth, index)
                 } else {
-                    0.5 * deviation[clusters.number(root, depth - 1, index / 4) as usize]
+                    let last = index >> (2 * (depth - known_depths + 1));
+                    let gain = match known_depths {
+                        1 => 1.0,
+                        d => of_coarse(d - 1, last).mean / of_coarse(d - 2, last / 4).mean,
+                    };
+                    // Of nothing to nothing nothing is known, nor needed.
+                    let gain = if gain >= 0.5 { gain.min(1.0) } else { 0.5 };
+                    let above = deviation[clusters.number(root, depth - 1, index / 4) as usize];
+                    Deviation { largest: gain * above.largest, mean: gain * above.mean }
                 };
             }
         }

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::{Demand, FastOperator, FastOptions};
 use crate::cluster::Clusters;
+use crate::cluster::fit::Deviation;
 use crate::monitor::Monitor;
 use crate::operator::exact;
 use crate::operator::walk::Stage;
@@ -50,12 +51,13 @@ fn sampled(stage: Stage, options: &FastOptions) -> u64 {
     }
     let Stage { mesh, clusters, .. } = stage;
     let size = mesh.bounds.extent();
-    let mut deviation = vec![0.0; clusters.len()];
+    let mut deviation = vec![Deviation::UNKNOWN; clusters.len()];
     for (root, r) in mesh.roots.iter().enumerate() {
         for depth in 0..=r.level {
             let radius = clusters.root_radius[root] / f64::from(1u32 << depth);
             let off = CURVATURE * (radius / size).powi(2);
             let first = clusters.number(root, depth, 0) as usize;
+            let off = Deviation { largest: 2.0 * off, mean: off };
             deviation[first..][..1 << (2 * depth)].fill(off);
         }
     }

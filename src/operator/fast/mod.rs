@@ -24,7 +24,7 @@ use self::slots::{NONE, Slots};
 use self::store::{FarPairs, Links};
 use super::pairs::{Cell, Descent, PairCounts, Pending, Rules, sources_of};
 use super::walk::Stage;
-use crate::cluster::fit::{Fit, fits};
+use crate::cluster::fit::{Deviation, Fit, fits};
 use crate::error::{Error, Result};
 use crate::far::Interpolation;
 use crate::far::interpolation::DIRECT_LEVELS;
@@ -132,8 +132,6 @@ impl<'a> FastOperator<'a> {
         let link_levels = (0..8).take_while(|l| mesh.basis.nodes() << (2 * l) <= n).count() as u32;
         let rules = Rules {
             eta: demand.eta,
-            // What eta leaves each of two clusters of one size.
-            eta_of_one: demand.eta / (2.0 - demand.eta),
             deviation: demand.deviation,
             allowed: demand.allowed,
             link_levels: link_levels.saturating_sub(1),
@@ -303,12 +301,12 @@ impl<'a> FastOperator<'a> {
         ]
     }
 
-    /// Largest product of a cluster's deviation and its form factor in any link of a node.
-    pub fn largest_link_error(&self, deviation: &[f64]) -> f64 {
+    /// Largest product of a cluster's mean deviation and its form factor in any link of a node.
+    pub fn largest_link_error(&self, deviation: &[Deviation]) -> f64 {
         let of_block = |block: &Block| {
             let mut largest: f64 = 0.0;
             block.links.form_factors(|cluster, factor| {
-                largest = largest.max(deviation[cluster as usize] * factor);
+                largest = largest.max(deviation[cluster as usize].mean * factor);
             });
             largest
         };

@@ -1,5 +1,6 @@
 //! What a user asks of the fast operator, and what that means for its parts.
 
+use crate::cluster::fit::Deviation;
 use crate::error::{Error, Result};
 use crate::far::interpolation::{LEAST_ORDER, MOST_INTERPOLATION_ORDER};
 
@@ -10,7 +11,7 @@ pub struct FastOptions {
     pub tolerance: f64,
     /// Order p of the far field; by the tolerance where it is not given.
     pub order: Option<usize>,
-    /// Far where R_P + R_Q <= eta times the distance of the centres; 1/2 where not given.
+    /// What is far, see [`crate::operator::pairs::far`]; 1/2 where not given.
     pub eta: Option<f64>,
 }
 
@@ -57,10 +58,11 @@ impl FastOptions {
         self.order.unwrap_or(by_tolerance.min(MOST_INTERPOLATION_ORDER))
     }
 
-    /// Largest product of deviation and form factor in a link. The errors of a node's links have
-    /// either sign: a quarter of the tolerance for each has been enough for all (tests measure it).
+    /// Largest error of a link, as it is bounded. The errors of a node's links have
+    /// either sign, and most are far below this bound: half of the tolerance for each has been
+    /// enough for all (tests measure it).
     pub fn allowed(&self, largest_irradiance: f64) -> f64 {
-        0.25 * self.tolerance * largest_irradiance
+        0.5 * self.tolerance * largest_irradiance
     }
 
     /// Precision of the integrals of links, relative to area/distance^2.
@@ -79,11 +81,11 @@ impl FastOptions {
 pub struct Demand<'a> {
     /// Order of the far field.
     pub order: usize,
-    /// Far where R_P + R_Q <= eta times the distance of the centres.
+    /// What is far, see [`crate::operator::pairs::far`].
     pub eta: f64,
     /// Deviation of the radiosity from linear on each cluster, W/m^2.
-    pub deviation: &'a [f64],
-    /// Largest product of deviation and form factor in a link, W/m^2.
+    pub deviation: &'a [Deviation],
+    /// Largest error of a link, W/m^2.
     pub allowed: f64,
     /// Precision of the integrals of links, relative to the irradiance; 0 for exact ones.
     pub precision: f64,
@@ -97,7 +99,7 @@ impl<'a> Demand<'a> {
     /// Half the tolerance is for the far field, half for links.
     pub fn new(
         options: &FastOptions,
-        deviation: &'a [f64],
+        deviation: &'a [Deviation],
         largest_irradiance: f64,
         sends: &'a [bool],
         receives: &'a [bool],
