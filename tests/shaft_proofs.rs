@@ -347,7 +347,7 @@ fn random_pair(seed: u64) -> Pair {
         let own = if r.below(2) == 0 { receiver } else { source };
         let other = if own == receiver { source } else { receiver };
         let up = normal(&own);
-        match r.below(10) {
+        match r.below(12) {
             0 => {
                 let corner = |k: usize| {
                     let side = |bit: usize| if k >> bit & 1 == 1 { 0.5 } else { -0.5 };
@@ -435,6 +435,22 @@ fn random_pair(seed: u64) -> Pair {
                     between - x + y,
                 ]));
             }
+            9 => {
+                // A polygon of many triangles.
+                let n = 4 + r.below(6);
+                let rim = |k: usize| {
+                    let (s, c) = (std::f64::consts::TAU * (k % n) as f64 / n as f64).sin_cos();
+                    middle + c * x + s * y
+                };
+                blockers.extend((0..n).map(|k| [middle, rim(k), rim(k + 1)]));
+            }
+            10 => {
+                // A triangle without a corner: a very short edge.
+                let (a, b, c) = (middle - x - y, middle + x, middle + y);
+                let short = 10f64.powf(-r.within(2.0, 14.0));
+                let (p, q) = (a + short * (b - a), a + r.within(0.5, 2.0) * short * (c - a));
+                blockers.extend([[p, b, c], [p, c, q]]);
+            }
             _ => blockers.push([middle + x, middle + y, middle + z]),
         }
     }
@@ -503,15 +519,10 @@ fn refute_all(make: fn(u64) -> Pair, count: u64) {
                 examine(&pair, seed, &format!("seed {seed} at {place:?}"))
             })
             .reduce(Tally::default, Tally::add);
+        let Tally { full, hidden, partial, tried, grazing, clear, clear_proved, .. } = &tally;
         println!(
-            "{place:?}: {} full, {} hidden, {} partial; {} of {} clear ones found; {} of {} segments graze; {} wrong",
-            tally.full,
-            tally.hidden,
-            tally.partial,
-            tally.clear_proved,
-            tally.clear,
-            tally.grazing,
-            tally.tried,
+            "{place:?}: {full} full, {hidden} hidden, {partial} partial; {clear_proved} of {clear} \
+             clear ones found; {grazing} of {tried} segments graze; {} wrong",
             tally.wrong.len()
         );
         all = all.add(tally);

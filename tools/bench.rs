@@ -27,6 +27,8 @@ struct Case {
     size: i64,
     operator: &'static str,
     tolerance: f64,
+    /// Order of the far field, where it does not follow from the tolerance.
+    order: Option<usize>,
     threads: usize,
 }
 
@@ -34,8 +36,14 @@ struct Case {
 const SAMPLES: usize = 400;
 
 fn cases() -> Vec<Case> {
-    let case =
-        |scene, size, operator, tolerance| Case { scene, size, operator, tolerance, threads: 2 };
+    let case = |scene, size, operator, tolerance| Case {
+        scene,
+        size,
+        operator,
+        tolerance,
+        order: None,
+        threads: 2,
+    };
     let mut list = vec![];
     for tolerance in [1e-5, 1e-7] {
         list.extend([4, 5, 6, 7].map(|size| case("paper", size, "fast", tolerance)));
@@ -50,6 +58,15 @@ fn cases() -> Vec<Case> {
         }
         list.push(case(scene, -6_000, "exact", 0.0));
     }
+    // The far field alone: links are exact at this tolerance.
+    for (scene, sizes) in
+        [("paper", [4, 5]), ("cornell", [-2_500, -10_000]), ("room", [-2_500, -10_000])]
+    {
+        for size in sizes {
+            let orders = [4, 6, 8, 10, 12].map(Some);
+            list.extend(orders.map(|order| Case { order, ..case(scene, size, "fast", 1e-12) }));
+        }
+    }
     list
 }
 
@@ -57,7 +74,7 @@ fn kind(case: &Case) -> Result<OperatorKind> {
     Ok(match case.operator {
         "exact" => OperatorKind::Exact,
         "clustered" => OperatorKind::Clustered(ClusteredOptions::new(0.125, 4)?),
-        _ => OperatorKind::Fast(FastOptions::new(case.tolerance, None, None)?),
+        _ => OperatorKind::Fast(FastOptions::new(case.tolerance, case.order, None)?),
     })
 }
 
@@ -163,7 +180,10 @@ fn main() -> Result<()> {
     let mut above: Option<(usize, Value)> = None;
     for (index, case) in list.iter().enumerate() {
         let operator = match case.operator {
-            "fast" => format!("fast {:.0e}", case.tolerance),
+            "fast" => match case.order {
+                None => format!("fast {:.0e}", case.tolerance),
+                Some(order) => format!("fast order {order}"),
+            },
             "clustered" => "clustered 0.125, 4".into(),
             name => name.into(),
         };
@@ -175,8 +195,8 @@ fn main() -> Result<()> {
         let number = |name: &str| number(&value, name);
         let same = |k: usize| {
             let other = &list[k];
-            (other.scene, other.operator, other.tolerance)
-                == (case.scene, case.operator, case.tolerance)
+            (other.scene, other.operator, other.tolerance, other.order)
+                == (case.scene, case.operator, case.tolerance, case.order)
         };
         let growth = |name: &str| match &above {
             Some((k, before)) if same(*k) => {

@@ -7,9 +7,9 @@
 //!
 //! D(P, Q) = det(w - P, w' - P, Q - P) = (w - P) x (w' - w) . (Q - P)
 //!
-//! is linear in P and linear in Q, so that a sign which it has at all pairs of corners it has at all
-//! pairs of points. Where the occluder's plane cuts a triangle, corners above it are paired with
-//! corners below it: the section of the shaft with the plane is the hull of their crossings.
+//! is linear in P and linear in Q, so that a sign which it has at all pairs of corners it has at
+//! all pairs of points. Where the occluder's plane cuts a triangle, corners above it are paired
+//! with corners below it: the section of the shaft with the plane is the hull of their crossings.
 
 use std::cell::OnceCell;
 
