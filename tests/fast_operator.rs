@@ -315,7 +315,8 @@ fn a_single_element_may_fill_the_view() {
     }
 }
 
-/// Errors of the far field alone fall by a factor of 3 or more with each order, down to 1e-9.
+/// Errors of the far field alone fall by a factor of 12 or more with each two orders, down to 1e-9.
+/// (Odd and even orders differ: one step alone may gain less than 3.)
 #[test]
 fn errors_fall_with_the_order() {
     [("paper", 1400), ("cornell", 800), ("room", 800)].par_iter().for_each(|&(name, elements)| {
@@ -330,6 +331,6 @@ fn errors_fall_with_the_order() {
         let text: String = errors.iter().map(|e| format!("{e:.1e} ")).collect();
         println!("{name}, {} elements: {text}", prepared.mesh.elements());
         assert!(errors[0] > 1e-5, "{name}: there is a far field");
-        assert!(errors.windows(2).all(|e| e[1] <= e[0] / 3.0 || e[1] <= 1e-9), "{name}: {text}");
+        assert!(errors.windows(3).all(|e| e[2] <= e[0] / 12.0 || e[2] <= 1e-9), "{name}: {text}");
     });
 }
