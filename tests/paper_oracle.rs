@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::DVec3;
 use lumel::mesh::{Basis, MeshOptions, Refinement};
 use lumel::monitor::Monitor;
-use lumel::operator::OperatorKind;
+use lumel::operator::{FastOptions, OperatorKind};
 use lumel::output::csv::Point;
 use lumel::probe::probe;
 use lumel::scene::{ReadOptions, read};
@@ -23,12 +23,12 @@ struct Errors {
     pointwise: f64,
 }
 
-fn errors(levels: u32) -> Errors {
+fn errors(levels: u32, operator: OperatorKind) -> Errors {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let scene = read(&root.join("scenes/paper.gltf"), &ReadOptions::default()).unwrap();
     let options = LightOptions {
         mesh: MeshOptions { basis: Basis::Linear, refinement: Refinement::Levels(levels) },
-        operator: OperatorKind::Exact,
+        operator,
         solve: SolveOptions { residual: 1e-12, ..SolveOptions::default() },
         max_memory: u64::MAX,
     };
@@ -63,7 +63,7 @@ fn errors(levels: u32) -> Errors {
 
 #[test]
 fn probes_converge_to_the_oracle() {
-    let ladder = [2, 3, 4].map(errors);
+    let ladder = [2, 3, 4].map(|levels| errors(levels, OperatorKind::Exact));
     for (e, n) in ladder.iter().zip([160, 640, 2560]) {
         println!("n {n}: far {:.2e} near {:.2e} pointwise {:.2e}", e.far, e.near, e.pointwise);
     }
@@ -74,4 +74,19 @@ fn probes_converge_to_the_oracle() {
     assert!(ladder[2].far < 2e-5 && ladder[2].near < 2e-4);
     // Linear elements across shadow lines: h^2, so about 1e-2 of the light in an umbra here.
     assert!(ladder[2].pointwise < 1e-2);
+}
+
+#[test]
+fn the_fast_operator_goes_on_converging_to_it() {
+    let fast = OperatorKind::Fast(FastOptions::new(1e-7, None, None).unwrap());
+    let ladder = [5, 6, 7].map(|levels| errors(levels, fast));
+    for (e, n) in ladder.iter().zip([10240, 40960, 163840]) {
+        println!("n {n}: far {:.2e} near {:.2e} pointwise {:.2e}", e.far, e.near, e.pointwise);
+    }
+    for pair in ladder.windows(2) {
+        assert!(pair[1].far < 0.5 * pair[0].far && pair[1].near < 0.6 * pair[0].near);
+        assert!(pair[1].pointwise < 0.5 * pair[0].pointwise);
+    }
+    assert!(ladder[2].far < 5e-8 && ladder[2].near < 1e-6);
+    assert!(ladder[2].pointwise < 3e-4);
 }
