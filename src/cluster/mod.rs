@@ -12,9 +12,10 @@ pub mod fit;
 mod spatial;
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use crate::geometry::circle::smallest_enclosing;
-use crate::mesh::{Mesh, child};
+use crate::mesh::{Mesh, Root, child};
 
 pub use spatial::{Branch, Content, SpatialTree};
 
@@ -33,9 +34,8 @@ pub struct Clusters {
 impl Clusters {
     /// Builds the tree of a mesh.
     pub fn build(mesh: &Mesh) -> Clusters {
-        let (mut first, mut centre, mut root_radius) = (vec![0], vec![], vec![]);
-        for root in &mesh.roots {
-            root_radius.push(smallest_enclosing(&root.corners).1);
+        let of_root = |root: &Root| {
+            let mut centre = Vec::with_capacity(Self::before(root.level + 1) as usize);
             let mut level = vec![root.corners];
             for depth in 0..=root.level {
                 centre.extend(level.iter().map(|t| smallest_enclosing(t).0));
@@ -43,6 +43,13 @@ impl Clusters {
                     level = level.iter().flat_map(|t| (0..4).map(move |k| child(t, k))).collect();
                 }
             }
+            (centre, smallest_enclosing(&root.corners).1)
+        };
+        let roots: Vec<(Vec<DVec2>, f64)> = mesh.roots.par_iter().map(of_root).collect();
+        let root_radius = roots.iter().map(|root| root.1).collect();
+        let (mut first, mut centre) = (vec![0], vec![]);
+        for (own, _) in roots {
+            centre.extend(own);
             first.push(centre.len() as u32);
         }
         Clusters { first, centre, root_radius, faces: SpatialTree::build(mesh) }
