@@ -48,6 +48,16 @@ impl<'a> Monitor<'a> {
         }
     }
 
+    /// Seconds until the work should stop; none without a limit.
+    pub fn seconds_left(&self) -> Option<f64> {
+        self.deadline.map(|(end, _)| end.saturating_duration_since(Instant::now()).as_secs_f64())
+    }
+
+    /// The seconds that were allowed in all; none without a limit.
+    pub fn time_limit(&self) -> Option<f64> {
+        self.deadline.map(|(_, seconds)| seconds)
+    }
+
     /// Begins a stage of `total` steps.
     pub fn stage(&self, name: &'static str, total: u64) -> Stage<'_> {
         if let Some(tell) = self.on_progress {

@@ -10,9 +10,9 @@ use lumel::monitor::Monitor;
 use lumel::operator::{FastOptions, OperatorKind};
 use lumel::output::csv::Point;
 use lumel::probe::probe;
-use lumel::scene::{ReadOptions, read};
-use lumel::solve::SolveOptions;
+use lumel::scene::{ReadOptions, Scene, read};
 use lumel::solve::light::{LightOptions, light};
+use lumel::solve::{Light, SolveOptions, WithinOptions, light_within};
 
 struct Errors {
     /// Largest error of points farther than 0.05 from the common edge of S1 and S5, and of nearer
@@ -33,6 +33,11 @@ fn errors(levels: u32, operator: OperatorKind) -> Errors {
         max_memory: u64::MAX,
     };
     let light = light(&scene, &options, &Monitor::silent()).unwrap();
+    errors_of(&scene, &light)
+}
+
+fn errors_of(scene: &Scene, light: &Light) -> Errors {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join("tests/data/paper_oracle.json")).unwrap();
     let oracle: serde_json::Value = serde_json::from_str(&text).unwrap();
     let entries = oracle["points"].as_array().unwrap();
@@ -42,7 +47,7 @@ fn errors(levels: u32, operator: OperatorKind) -> Errors {
         .iter()
         .map(|p| Point { position: vector(&p["x"]), normal: vector(&p["normal"]) })
         .collect();
-    let results = probe(&scene, &light, &points, &Monitor::silent()).unwrap();
+    let results = probe(scene, light, &points, &Monitor::silent()).unwrap();
     let want: Vec<f64> = entries.iter().map(|p| p["u"].as_f64().unwrap()).collect();
     let largest = want.iter().copied().fold(0.0, f64::max);
     let mut errors = Errors { far: 0.0, near: 0.0, pointwise: 0.0 };
@@ -89,4 +94,19 @@ fn the_fast_operator_goes_on_converging_to_it() {
     }
     assert!(ladder[2].far < 5e-8 && ladder[2].near < 1e-6);
     assert!(ladder[2].pointwise < 3e-4);
+}
+
+/// With direct light apart even points in the umbra, 1e-5 times as bright as the largest, are right.
+#[test]
+fn light_to_a_tolerance_is_right_at_each_point() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.gltf");
+    let scene = read(&path, &ReadOptions::default()).unwrap();
+    for (tolerance, bounds) in [(1e-3, [1e-5, 3e-5, 3e-2]), (1e-5, [3e-7, 2e-6, 5e-4])] {
+        let options = WithinOptions { tolerance, max_memory: u64::MAX };
+        let light = light_within(&scene, &options, &Monitor::silent()).unwrap();
+        let errors = errors_of(&scene, &light);
+        println!("{tolerance:e}: {:.1e} {:.1e} {:.1e}", errors.far, errors.near, errors.pointwise);
+        let found = [errors.far, errors.near, errors.pointwise];
+        assert!(found.iter().zip(bounds).all(|(error, bound)| *error <= bound), "{found:?}");
+    }
 }

@@ -174,12 +174,59 @@ fn work_that_does_not_fit_is_refused_before_it_begins() {
     fs::write(room.path().join("old.png"), "old").unwrap();
     fails(
         room.path(),
-        "render scenes/cornell.gltf -o old.png --max-memory 1MB",
+        "render scenes/cornell.gltf -o old.png --subdivide 4 --max-memory 1MB",
         1,
         &["would need about", "MiB of memory, but only 1.0 MiB", "--max-memory", "--max-edge"],
     );
     assert_eq!(fs::read(room.path().join("old.png")).unwrap(), b"old");
     assert_eq!(names_in(room.path()), ["old.png"]);
+}
+
+#[test]
+fn a_tolerance_that_cannot_be_met_gives_the_best_and_says_so() {
+    let room = tempfile::tempdir().unwrap();
+    fails(
+        room.path(),
+        "render scenes/cornell.gltf -o best.exr --size 32x32 --tolerance 0.1% --max-memory 8MB --report r.json \
+         --error-map map.exr",
+        4,
+        &["tolerance of 0.1 % was not met", "memory", "--max-memory", "estimated error of 0."],
+    );
+    let values = json(&room.path().join("r.json"));
+    let estimate = values["values"]["estimated error rms"].as_f64().unwrap();
+    assert!(estimate > 0.001 && estimate < 0.02, "{estimate}");
+    assert!(brightest(&Exr::read(&room.path().join("best.exr")).pixels) > 1.0);
+    assert_eq!(names_in(room.path()), ["best.exr", "map.exr", "r.json"]);
+}
+
+/// The picture of a tolerance against one of a tenth of it; and the estimates of its errors.
+#[test]
+fn a_tolerance_is_all_that_needs_to_be_said() {
+    let room = tempfile::tempdir().unwrap();
+    let words = "render scenes/cornell.gltf --size 96x96 --tolerance";
+    succeeds(room.path(), &format!("{words} 1% -o a.exr --report a.json --error-map map.exr"));
+    succeeds(room.path(), &format!("{words} 0.1% -o b.exr"));
+    let [a, b, map] = ["a.exr", "b.exr", "map.exr"].map(|f| Exr::read(&room.path().join(f)));
+    assert_eq!(a.text("tolerance").as_deref(), Some("0.01"));
+    let mean = b.pixels.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
+    let squares: f64 = a
+        .pixels
+        .iter()
+        .flatten()
+        .zip(b.pixels.iter().flatten())
+        .map(|(a, b)| f64::from(a - b).powi(2))
+        .sum();
+    let n = (3 * a.pixels.len()) as f64;
+    let error = (squares / n).sqrt() / (mean / n);
+    assert!(error < 0.01, "{error}");
+    // The map tells relative errors that are small nearly everywhere.
+    let small = map.pixels.iter().filter(|p| p.iter().all(|e| (0.0..0.02).contains(e))).count();
+    assert!(100 * small > 90 * map.pixels.len(), "{small}");
+    let values = &json(&room.path().join("a.json"))["values"];
+    let number = |name: &str| values[name].as_f64().unwrap();
+    assert!(number("estimated error rms") <= 0.01);
+    assert!(number("estimated error of the output rms") >= number("estimated error rms"));
+    assert!(number("estimated error maximum") >= number("estimated error rms"));
 }
 
 #[test]

@@ -14,8 +14,8 @@ const AFTER_HELP: &str = "\
 Examples:
   lumel inspect room.gltf
       What is in the file: faces, materials, lamps, cameras, and what was odd.
-  lumel render room.gltf -o view.png --max-edge 0.1 --gather
-      The view of the file's first camera, from elements of at most 10 cm.
+  lumel render room.gltf -o view.png --tolerance 0.3%
+      The view of the file's first camera, irradiance right to 0.3 % (root mean square).
   lumel probe room.obj --points desk.csv -o lux.csv --emission 'Lamp*=40,38,30'
       Irradiance at given points, with the radiance of the lamps set by hand.
 
@@ -79,10 +79,10 @@ pub struct InspectArgs {
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
-  lumel render room.gltf -o view.exr --max-edge 0.1
+  lumel render room.gltf -o view.exr --tolerance 0.5%
       Linear radiance, in W/(m^2 sr), from the file's first camera.
-  lumel render room.gltf -o view.png --camera Desk --size 1920x1080 --exposure 1.5 --gather
-      One camera by its name, 1.5 stops brighter, with shadows as sharp as they are.
+  lumel render room.gltf -o view.png --camera Desk --size 1920x1080 --exposure 1.5
+      One camera by its name, 1.5 stops brighter.
   lumel render room.obj -o view.png --eye 0,1.6,4 --look-at 0,1,0 --fov 60
       A view of one's own, for a file without cameras.")]
 pub struct RenderArgs {
@@ -115,7 +115,7 @@ irradiance_r,irradiance_g,irradiance_b,radiosity_r,radiosity_g,radiosity_b in W/
 radiosity is empty where there is no surface.
 
 Examples:
-  lumel probe room.gltf --points desk.csv -o light.csv --max-edge 0.1
+  lumel probe room.gltf --points desk.csv -o light.csv --tolerance 0.1%
   printf 'x,y,z,nx,ny,nz\\n0,0.75,0,0,1,0\\n' > p.csv && lumel probe room.gltf --points p.csv")]
 pub struct ProbeArgs {
     /// The scene and how to read it.
@@ -218,9 +218,14 @@ pub struct PictureArgs {
     /// Bits a channel of a PNG picture
     #[arg(long, value_name = "8|16", default_value = "8")]
     pub bits: BitsArg,
-    /// Gather light at every pixel: exact shadows whatever the mesh, but slower
+    /// With elements of a given size: gather light at every pixel, with exact shadows whatever the
+    /// mesh, but slower (done wherever needed with --tolerance)
     #[arg(long)]
     pub gather: bool,
+    /// Also write a picture of the estimated error of the irradiance at each pixel, relative to its
+    /// mean over the surface (not with elements of a given size)
+    #[arg(long, value_name = "FILE")]
+    pub error_map: Option<PathBuf>,
     /// Samples along each side of a pixel: N makes N x N a pixel
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=64))]
     pub samples: u32,
@@ -230,21 +235,28 @@ pub struct PictureArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Solution")]
 pub struct SolveArgs {
-    /// How radiosity varies within an element
-    #[arg(long, value_enum, default_value = "linear")]
-    pub basis: BasisArg,
+    /// Error of the irradiance that is wanted: root mean square over the surface, relative to its
+    /// mean, such as 1% or 0.01. Mesh, operator and gathering follow from it [default: 1%, unless one
+    /// of the following options says otherwise]
+    #[arg(long, value_name = "E", value_parser = values::tolerance, allow_negative_numbers = true,
+        conflicts_with_all = ["basis", "max_edge", "subdivide", "operator", "operator_tolerance", "eta", "order", "residual"])]
+    pub tolerance: Option<f64>,
+    /// How radiosity varies within an element [default: linear]
+    #[arg(long, value_enum)]
+    pub basis: Option<BasisArg>,
     /// Refine until no edge of an element is longer than this, metres
     #[arg(long, value_name = "LENGTH", value_parser = values::positive, conflicts_with = "subdivide", allow_negative_numbers = true)]
     pub max_edge: Option<f64>,
     /// Refine every face this many times, into 4 elements each time
     #[arg(long, value_name = "LEVELS", value_parser = values::levels, allow_negative_numbers = true)]
     pub subdivide: Option<u32>,
-    /// How the operator of the equation is represented
-    #[arg(long, value_enum, default_value = "fast")]
-    pub operator: OperatorArg,
+    /// How the operator of the equation is represented [default: fast]
+    #[arg(long, value_enum)]
+    pub operator: Option<OperatorArg>,
     /// With --operator fast: errors of the irradiance that it may make, relative to the largest
-    #[arg(long, value_name = "T", default_value = "1e-4", value_parser = values::residual, allow_negative_numbers = true)]
-    pub operator_tolerance: f64,
+    /// [default: 1e-4]
+    #[arg(long, value_name = "T", value_parser = values::residual, allow_negative_numbers = true)]
+    pub operator_tolerance: Option<f64>,
     /// For experts: clusters of radius up to ETA times their distance are far (of both clusters
     /// together with --operator fast) [default: 0.5; 0.25 with --operator clustered]
     #[arg(long, value_name = "ETA", value_parser = values::positive, allow_negative_numbers = true)]
@@ -253,9 +265,9 @@ pub struct SolveArgs {
     /// tolerance; 6 with --operator clustered]
     #[arg(long, value_name = "M")]
     pub order: Option<usize>,
-    /// Iterate until the relative residual is below this
-    #[arg(long, value_name = "R", default_value = "1e-8", value_parser = values::residual, allow_negative_numbers = true)]
-    pub residual: f64,
+    /// Iterate until the relative residual is below this [default: 1e-8]
+    #[arg(long, value_name = "R", value_parser = values::residual, allow_negative_numbers = true)]
+    pub residual: Option<f64>,
     /// Use no more memory than this: 2GiB, 500MB, 75% (of what there is)
     #[arg(long, value_name = "SIZE", default_value = "75%", value_parser = values::memory_size, allow_negative_numbers = true)]
     pub max_memory: MemorySize,
@@ -333,7 +345,7 @@ mod tests {
         assert_eq!(args.view.eye, Some(DVec3::new(-1.0, -2.0, -3.0)));
         assert_eq!(args.view.up, Some(DVec3::NEG_Y));
         assert_eq!(args.picture.exposure, -2.0);
-        assert_eq!(args.solve.basis, BasisArg::Linear);
+        assert_eq!(args.solve.tolerance, None);
         assert_eq!(args.solve.max_memory, MemorySize::Share(0.75));
     }
 }

@@ -6,6 +6,7 @@ use lumel::output::camera_matrices::CameraMatrices;
 use lumel::output::csv;
 use lumel::output::picture::{Picture, Quantity, write_picture};
 use lumel::render::{self, RenderOptions};
+use lumel::solve::Light;
 use lumel::{Error, Monitor, Result, probe, reference};
 
 use super::args::{Cli, Command};
@@ -28,7 +29,7 @@ pub fn run(cli: Cli) -> Result<()> {
 fn inspect(settings: &InspectSettings) -> Result<()> {
     let path = settings.scene.path.as_path();
     let mut session =
-        Session::begin("inspect", path, &[], None, settings.described(), &settings.run)?;
+        Session::begin("inspect", path, &[], &[], settings.described(), &settings.run)?;
     let progress = Progress::new(settings.run.quiet);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
@@ -51,8 +52,9 @@ fn inspect(settings: &InspectSettings) -> Result<()> {
 fn render(settings: &RenderSettings) -> Result<()> {
     let path = settings.scene.path.as_path();
     let output = settings.output.as_path();
+    let outputs: Vec<&Path> = [output].into_iter().chain(settings.error_map.as_deref()).collect();
     let mut session =
-        Session::begin("render", path, &[], Some(output), settings.described(), &settings.run)?;
+        Session::begin("render", path, &[], &outputs, settings.described(), &settings.run)?;
     let progress = Progress::new(settings.run.quiet);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
@@ -64,15 +66,17 @@ fn render(settings: &RenderSettings) -> Result<()> {
     }
     let view = view::choose(&scene, &settings.view)?;
     let light = session.light(&scene, &settings.solve, &monitor)?;
+    let monitor = for_output(monitor, &light, &tell);
     let options = RenderOptions {
         width: view.width,
         height: view.height,
         samples: settings.samples,
         gather: settings.gather,
     };
-    let pixels = session
+    let (pixels, gathered) = session
         .clock
         .time("render", || render::render(&scene, &light, &view.camera, &options, &monitor))?;
+    session.gathered(&light, &gathered);
     let mut metadata = settings.metadata();
     metadata.push(("view".into(), view.camera.name.clone()));
     let aspect = f64::from(view.width) / f64::from(view.height);
@@ -85,16 +89,25 @@ fn render(settings: &RenderSettings) -> Result<()> {
         camera: Some(CameraMatrices::of(&view.camera, aspect)),
     };
     session.clock.time("write", || write_picture(output, &picture, &settings.picture))?;
+    if let Some(path) = &settings.error_map {
+        let pixels = session.clock.time("error map", || {
+            render::error_map(&scene, &light, &view.camera, &options, &monitor)
+        })?;
+        let map = Picture { pixels, quantity: Quantity::RelativeError, ..picture };
+        session.clock.time("write", || write_picture(path, &map, &settings.picture))?;
+    }
     progress.clear();
-    session.finish()
+    session.finish()?;
+    met(&light)
 }
 
 fn probe(settings: &ProbeSettings) -> Result<()> {
     let path = settings.scene.path.as_path();
     let inputs = [settings.points.as_path()];
     let output = settings.output.as_deref();
+    let outputs: Vec<&Path> = output.into_iter().collect();
     let mut session =
-        Session::begin("probe", path, &inputs, output, settings.described(), &settings.run)?;
+        Session::begin("probe", path, &inputs, &outputs, settings.described(), &settings.run)?;
     let progress = Progress::new(settings.run.quiet);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
@@ -108,6 +121,7 @@ fn probe(settings: &ProbeSettings) -> Result<()> {
         console::print_warnings(&scene.notices);
     }
     let light = session.light(&scene, &settings.solve, &monitor)?;
+    let monitor = for_output(monitor, &light, &tell);
     let results =
         session.clock.time("probe", || probe::probe(&scene, &light, &points, &monitor))?;
     progress.clear();
@@ -115,13 +129,44 @@ fn probe(settings: &ProbeSettings) -> Result<()> {
         Some(path) => csv::write_results(path, &points, &results)?,
         None => console::print(&csv::format_results(&points, &results))?,
     }
-    session.finish()
+    session.finish()?;
+    met(&light)
+}
+
+/// What watches over the making of the output: when time ran out, the best result is still written.
+fn for_output<'a>(
+    monitor: Monitor<'a>,
+    light: &Light,
+    tell: &'a (dyn Fn(&'static str, u64, u64) + Sync),
+) -> Monitor<'a> {
+    let late = light.apart().is_some_and(|source| source.shortfall.is_some());
+    if late { Monitor::new(interrupt::flag(), None, tell) } else { monitor }
+}
+
+/// Whether the light is as good as was asked for.
+fn met(light: &Light) -> Result<()> {
+    let Some(source) = light.apart() else { return Ok(()) };
+    let Some(why) = &source.shortfall else { return Ok(()) };
+    Err(Error::ToleranceNotMet(format!(
+        "the tolerance of {} was not met: {why}. What was written has an estimated error of {} (root \
+         mean square, relative to the mean irradiance)",
+        percent(source.tolerance),
+        percent(source.estimate.rms)
+    )))
+}
+
+fn percent(share: f64) -> String {
+    let rounded = format!("{:.1e}", 100.0 * share).parse::<f64>();
+    match rounded {
+        Ok(percent) if percent.is_finite() => format!("{percent} %"),
+        _ => "unknown size".into(),
+    }
 }
 
 fn tables(settings: &ReferenceSettings) -> Result<()> {
     let paper = Path::new("Atkinson and Chien 2006");
     let mut session =
-        Session::begin("reference", paper, &[], None, settings.described(), &settings.run)?;
+        Session::begin("reference", paper, &[], &[], settings.described(), &settings.run)?;
     let progress = Progress::new(settings.run.quiet);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);

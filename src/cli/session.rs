@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use lumel::output::atomic::{check_writable, same_file};
 use lumel::output::report::{Report, StageClock};
+use lumel::reconstruct::irradiance::IrradianceCounts;
 use lumel::scene::{self, Scene};
 use lumel::solve::light::{self, Light};
+use lumel::solve::{WithinOptions, light_within};
 use lumel::{Error, Monitor, Result};
 
 use super::advice::advice;
@@ -23,28 +25,28 @@ pub struct Session {
 }
 
 impl Session {
-    /// Begins a command: fails early where its `output` or the report could not be written, and
+    /// Begins a command: fails early where its `outputs` or the report could not be written, and
     /// sets the number of threads. The scene and `inputs` must not be overwritten.
     pub fn begin(
         command: &str,
         scene: &Path,
         inputs: &[&Path],
-        output: Option<&Path>,
+        outputs: &[&Path],
         settings: Described,
         run: &RunSettings,
     ) -> Result<Session> {
         let inputs = [&[scene], inputs].concat();
         let report_path = run.report.as_deref();
-        for target in output.into_iter().chain(report_path) {
+        let targets: Vec<&Path> = outputs.iter().copied().chain(report_path).collect();
+        for (k, target) in targets.iter().enumerate() {
             check_writable(target, &inputs)?;
-        }
-        if let (Some(output), Some(report)) = (output, report_path)
-            && same_file(output, report)
-        {
-            return Err(Error::Usage(format!(
-                "--output and --report are the same file, {}; give them different names",
-                output.display()
-            )));
+            if let Some(twin) = targets[..k].iter().find(|other| same_file(other, target)) {
+                return Err(Error::Usage(format!(
+                    "two outputs are the same file, {} and {}; give them different names",
+                    twin.display(),
+                    target.display()
+                )));
+            }
         }
         if let Some(threads) = run.threads {
             rayon::ThreadPoolBuilder::new()
@@ -89,9 +91,21 @@ impl Session {
         settings: &SolveSettings,
         monitor: &Monitor,
     ) -> Result<Light> {
-        let light =
-            self.clock.time("solve", || light::light(scene, &settings.light_options(), monitor))?;
+        let light = self.clock.time("solve", || match settings.tolerance {
+            Some(tolerance) => {
+                let max_memory = settings.max_memory.unwrap_or(u64::MAX);
+                light_within(scene, &WithinOptions { tolerance, max_memory }, monitor)
+            }
+            None => light::light(scene, &settings.light_options(), monitor),
+        })?;
         let report = &mut self.report;
+        if let Some(source) = light.apart() {
+            let estimate = source.estimate;
+            report.count("meshes solved on", estimate.steps as usize);
+            report.value("estimated error rms", estimate.rms);
+            report.value("estimated error maximum", estimate.maximum);
+            report.channels("mean irradiance", estimate.mean.to_array());
+        }
         let contacts = light.mesh.contacts;
         report.count("faces cut at contacts", contacts.cut);
         report.count("segments of contacts", contacts.segments);
@@ -117,6 +131,19 @@ impl Session {
         report.value("largest row sum", light.row_sums.1);
         report.channels("residual", light.solution.residual.to_array());
         Ok(light)
+    }
+
+    /// Notes how much was gathered for the output.
+    pub fn gathered(&mut self, light: &Light, counts: &IrradianceCounts) {
+        let report = &mut self.report;
+        report.count("points", counts.direct.points as usize);
+        report.count("gathers of direct light", counts.direct.gathered as usize);
+        report.count("gathers of indirect light", counts.indirect.gathered as usize);
+        if let Some(source) = light.apart() {
+            let filled = counts.error(source.estimate.mean);
+            report.value("estimated error of filling in", filled);
+            report.value("estimated error of the output rms", source.estimate.rms.hypot(filled));
+        }
     }
 
     /// Ends the command: writes the report where one was asked for.

@@ -25,6 +25,9 @@ use super::values::MemorySize;
 /// Elements where the user does not say how fine the mesh is.
 const USUAL_ELEMENTS: usize = 2000;
 
+/// The error where the user does not say how good the light must be.
+const USUAL_TOLERANCE: f64 = 0.01;
+
 /// Names and values, as written into pictures and reports.
 pub type Described = Vec<(String, String)>;
 
@@ -87,6 +90,9 @@ pub enum Refinement {
 /// How to solve.
 #[derive(Clone, Copy, Debug)]
 pub struct SolveSettings {
+    /// The error that is wanted, from which all else follows; where there is none, the fields below
+    /// say how to solve.
+    pub tolerance: Option<f64>,
     /// How radiosity varies within an element.
     pub basis: BasisArg,
     /// How the mesh is refined.
@@ -142,6 +148,8 @@ pub struct RenderSettings {
     pub gather: bool,
     /// Samples along each side of a pixel.
     pub samples: u32,
+    /// Where a picture of the estimated errors goes.
+    pub error_map: Option<PathBuf>,
     /// How to solve.
     pub solve: SolveSettings,
     /// How to run.
@@ -189,11 +197,22 @@ impl RenderSettings {
     /// Checks what was typed.
     pub fn new(args: RenderArgs) -> Result<Self> {
         PictureFormat::of(&args.output)?;
-        let PictureArgs { exposure, bits, gather, samples } = args.picture;
+        let PictureArgs { exposure, bits, gather, samples, error_map } = args.picture;
         let png_bits = match bits {
             BitsArg::Eight => 8,
             BitsArg::Sixteen => 16,
         };
+        let solve = solve(&args.solve)?;
+        if let Some(path) = &error_map {
+            PictureFormat::of(path)?;
+            if solve.tolerance.is_none() {
+                return Err(Error::Usage(
+                    "--error-map needs an estimate of the error: use --tolerance, and leave out \
+                     options that set elements and operator by hand"
+                        .into(),
+                ));
+            }
+        }
         Ok(RenderSettings {
             scene: scene(args.scene),
             output: args.output,
@@ -201,7 +220,8 @@ impl RenderSettings {
             picture: PictureOptions { exposure_ev: exposure, png_bits },
             gather,
             samples,
-            solve: solve(&args.solve)?,
+            error_map,
+            solve,
             run: run(args.run),
         })
     }
@@ -211,7 +231,9 @@ impl RenderSettings {
         let mut list = self.scene.metadata();
         list.extend(self.view.metadata());
         list.extend(self.solve.metadata());
-        list.push(pair("gather", self.gather));
+        if self.solve.tolerance.is_none() {
+            list.push(pair("gather", self.gather));
+        }
         list.push(pair("samples", self.samples));
         list
     }
@@ -220,6 +242,7 @@ impl RenderSettings {
     pub fn described(&self) -> Described {
         let mut list = self.metadata();
         list.push(pair("output", self.output.display()));
+        list.extend(self.error_map.iter().map(|path| pair("error-map", path.display())));
         list.push(pair("exposure", self.picture.exposure_ev));
         list.push(pair("bits", self.picture.png_bits));
         list.extend(self.solve.described());
@@ -357,6 +380,9 @@ impl SolveSettings {
             BasisArg::Constant => "constant",
             BasisArg::Linear => "linear",
         };
+        if let Some(tolerance) = self.tolerance {
+            return vec![pair("tolerance", tolerance)];
+        }
         let mut list = vec![pair("basis", basis), pair("residual", self.residual)];
         match self.refinement {
             Refinement::Usual => {}
@@ -443,9 +469,18 @@ fn solve(args: &SolveArgs) -> Result<SolveSettings> {
         (None, Some(levels)) => Refinement::Levels(levels),
         (None, None) => Refinement::Usual,
     };
-    let operator = match args.operator {
+    let given = args.basis.is_some()
+        || args.max_edge.is_some()
+        || args.subdivide.is_some()
+        || args.operator.is_some()
+        || args.operator_tolerance.is_some()
+        || args.eta.is_some()
+        || args.order.is_some()
+        || args.residual.is_some();
+    let operator = match args.operator.unwrap_or(OperatorArg::Fast) {
         OperatorArg::Fast => {
-            OperatorKind::Fast(FastOptions::new(args.operator_tolerance, args.order, args.eta)?)
+            let tolerance = args.operator_tolerance.unwrap_or(FastOptions::default().tolerance);
+            OperatorKind::Fast(FastOptions::new(tolerance, args.order, args.eta)?)
         }
         OperatorArg::Exact => OperatorKind::Exact,
         OperatorArg::Clustered => OperatorKind::Clustered(ClusteredOptions::new(
@@ -454,10 +489,11 @@ fn solve(args: &SolveArgs) -> Result<SolveSettings> {
         )?),
     };
     Ok(SolveSettings {
-        basis: args.basis,
+        tolerance: if given { None } else { Some(args.tolerance.unwrap_or(USUAL_TOLERANCE)) },
+        basis: args.basis.unwrap_or(BasisArg::Linear),
         refinement,
         operator,
-        residual: args.residual,
+        residual: args.residual.unwrap_or(SolveOptions::default().residual),
         max_memory: max_memory(args.max_memory, machine::usable_memory()),
     })
 }
@@ -527,6 +563,20 @@ mod tests {
         }
         has(&other.described(), "threads", "3");
         has(&other.described(), "max-memory", "1073741824 B");
+    }
+
+    #[test]
+    fn a_tolerance_is_what_counts_unless_elements_are_given() {
+        let solve = |typed: &str| render(&format!("-o a.png {typed}")).unwrap().solve;
+        assert_eq!(solve("").tolerance, Some(0.01));
+        assert_eq!(solve("--tolerance 0.3%").tolerance, Some(0.003));
+        assert_eq!(solve("--tolerance 0.02 --max-memory 1GiB").tolerance, Some(0.02));
+        for typed in ["--max-edge 0.1", "--subdivide 2", "--basis constant", "--residual 1e-5"] {
+            assert_eq!(solve(typed).tolerance, None, "{typed}");
+        }
+        let typed = "lumel render s.gltf -o a.png --tolerance 1% --subdivide 2";
+        assert!(Cli::try_parse_from(typed.split(' ')).is_err());
+        assert!(render("-o a.png --subdivide 2 --error-map e.exr").is_err());
     }
 
     #[test]

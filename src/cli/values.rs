@@ -35,6 +35,19 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A relative error: a number, or a percentage.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    let expected = "expected an error between 0 and 100 %, such as 1% or 0.01";
+    let (digits, unit) = match text.trim_end().strip_suffix('%') {
+        Some(digits) => (digits.trim_end(), 0.01),
+        None => (text, 1.0),
+    };
+    match number(digits).map_err(|_| expected)? * unit {
+        v if v > 0.0 && v < 1.0 => Ok(v),
+        _ => Err(expected.into()),
+    }
+}
+
 /// A relative residual.
 pub fn residual(text: &str) -> Result<f64, String> {
     match number(text)? {

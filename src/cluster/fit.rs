@@ -115,8 +115,28 @@ fn on_element<const C: usize>(basis: Basis, u: &[[f64; C]], element: usize) -> F
     }
 }
 
+/// Mean square difference between the fit of a cluster and the fits of its children, per channel.
+pub fn mismatch<const C: usize>(fit: &Fit<C>, children: &[Fit<C>; 4]) -> [f64; C] {
+    let mut mean = [0.0; C];
+    for (own, at) in children.iter().zip(PARENT_AT_CHILD.iter()) {
+        for (value, at) in own.iter().zip(at) {
+            for c in 0..C {
+                let fitted: f64 = (0..3).map(|i| at[i] * fit[i][c]).sum();
+                mean[c] += (value[c] - fitted).powi(2) / 12.0;
+            }
+        }
+    }
+    mean
+}
+
+/// The linear function with node values `fit`, at the nodes of a cluster's four children.
+pub fn split<const C: usize>(fit: &Fit<C>) -> [Fit<C>; 4] {
+    PARENT_AT_CHILD
+        .map(|at| at.map(|at| std::array::from_fn(|c| (0..3).map(|i| at[i] * fit[i][c]).sum())))
+}
+
 /// The fit of a cluster to the fits of its children.
-fn join<const C: usize>(children: &[Fit<C>; 4]) -> Fit<C> {
+pub fn join<const C: usize>(children: &[Fit<C>; 4]) -> Fit<C> {
     let mut fit = [[0.0; C]; 3];
     for (own, at) in children.iter().zip(PARENT_AT_CHILD.iter()) {
         for (value, phi) in own.iter().zip(at) {

@@ -8,6 +8,7 @@
 //! Above the faces stands a binary tree of any orientation, with boxes and normal cones
 //! ([`Branch`]): whole parts of a scene that face away from a point are passed over at once.
 
+pub mod adaptive;
 pub mod fit;
 mod spatial;
 

@@ -77,6 +77,14 @@ pub fn build(scene: &Scene, options: &MeshOptions) -> Result<Mesh> {
 }
 
 impl Mesh {
+    /// The same surface, refined otherwise.
+    pub fn refined_to(&self, refinement: Refinement) -> Result<Mesh> {
+        let mut roots = self.roots.clone();
+        choose_levels(&mut roots, refinement);
+        let (element_root, element_corners) = elements(&mut roots)?;
+        Ok(Mesh { roots, element_root, element_corners, ..self.clone() })
+    }
+
     /// The same surface, each root refined `levels` times less (or not at all).
     pub fn coarsened(&self, levels: u32) -> Result<Mesh> {
         let mut roots = self.roots.clone();

@@ -203,12 +203,17 @@ impl Mesh {
         root.first as usize + index
     }
 
-    /// The element of a face that contains (or is nearest to) the plane point `x`.
-    pub fn locate(&self, face: usize, x: DVec2) -> usize {
+    /// The root of a face that contains (or is nearest to) the plane point `x`.
+    pub fn root_at(&self, face: usize, x: DVec2) -> usize {
         let (begin, end) = self.faces[face].roots;
         let inside = |r: u32| barycentric(&self.roots[r as usize].corners, x).min_element();
         let root = (begin..end).max_by(|&a, &b| inside(a).total_cmp(&inside(b)));
-        self.locate_in(root.unwrap_or(begin) as usize, x)
+        root.unwrap_or(begin) as usize
+    }
+
+    /// The element of a face that contains (or is nearest to) the plane point `x`.
+    pub fn locate(&self, face: usize, x: DVec2) -> usize {
+        self.locate_in(self.root_at(face, x), x)
     }
 }
 

@@ -67,11 +67,12 @@ impl std::ops::AddAssign for Counts {
 /// Memory for walking, used again for every point.
 #[derive(Default)]
 pub struct Walker {
-    shadows: Shadows,
-    active: Vec<u32>,
+    pub(super) shadows: Shadows,
+    pub(super) active: Vec<u32>,
+    pub(super) numbers: Vec<u32>,
     facing: Vec<u32>,
     stack: Vec<u32>,
-    clip: Pieces,
+    pub(super) clip: Pieces,
     /// What was met since this was last reset.
     pub counts: Counts,
 }
@@ -177,11 +178,41 @@ impl Walker {
         rule: Rule,
         mut seen: impl FnMut(&Scope, Seen),
     ) {
+        let Stage { mesh, clusters, .. } = stage;
+        self.each_face(stage, point, normal, None, |walker, scope| {
+            let face = scope.face;
+            for root in face.roots.0..face.roots.1 {
+                let r = &mesh.roots[root as usize];
+                let radius = clusters.root_radius[root as usize];
+                let place = Place { root, depth: 0, level: r.level, index: 0, radius };
+                walker.descend(stage, scope, place, &r.corners, rule, 0, &mut seen);
+            }
+        });
+    }
+
+    /// Calls `look` with each face that may send light to `point` with unit `normal` (of those in
+    /// `only`, where they are given), with its shadows found and `active` holding their numbers.
+    pub(super) fn each_face(
+        &mut self,
+        stage: Stage,
+        point: DVec3,
+        normal: DVec3,
+        only: Option<&[u32]>,
+        mut look: impl FnMut(&mut Walker, &Scope),
+    ) {
         let Stage { mesh, clusters, occluders } = stage;
         let observer = Observer { occluders, point, normal };
         let tau = occluders.coincidence();
-        clusters.faces.facing(point, normal, tau, &mut self.facing, &mut self.stack);
-        self.counts.faces_away += (mesh.faces.len() - self.facing.len()) as u64;
+        match only {
+            None => {
+                clusters.faces.facing(point, normal, tau, &mut self.facing, &mut self.stack);
+                self.counts.faces_away += (mesh.faces.len() - self.facing.len()) as u64;
+            }
+            Some(faces) => {
+                self.facing.clear();
+                self.facing.extend(faces);
+            }
+        }
         for k in 0..self.facing.len() {
             let index = self.facing[k];
             let face = &mesh.faces[index as usize];
@@ -203,12 +234,7 @@ impl Walker {
                 self.counts.faces_shaded += 1;
             }
             let scope = Scope { face, index, view, horizon };
-            for root in face.roots.0..face.roots.1 {
-                let r = &mesh.roots[root as usize];
-                let radius = clusters.root_radius[root as usize];
-                let place = Place { root, depth: 0, level: r.level, index: 0, radius };
-                self.descend(stage, &scope, place, &r.corners, rule, 0, &mut seen);
-            }
+            look(self, &scope);
         }
     }
 

@@ -15,6 +15,8 @@ pub enum Quantity {
     Irradiance,
     /// Radiosity, W/m^2.
     Radiosity,
+    /// Error of the irradiance relative to its mean over the surface.
+    RelativeError,
 }
 
 impl Quantity {
@@ -24,6 +26,7 @@ impl Quantity {
             Quantity::Radiance => "radiance",
             Quantity::Irradiance => "irradiance",
             Quantity::Radiosity => "radiosity",
+            Quantity::RelativeError => "relative error of irradiance",
         }
     }
 
@@ -32,6 +35,7 @@ impl Quantity {
         match self {
             Quantity::Radiance => "W/(m^2 sr)",
             Quantity::Irradiance | Quantity::Radiosity => "W/m^2",
+            Quantity::RelativeError => "1",
         }
     }
 }

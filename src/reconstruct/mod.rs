@@ -3,6 +3,8 @@
 //! What is reconstructed is irradiance, which is smooth where reflectance is not: radiosity is
 //! E + rho H with E and rho taken where it is needed.
 
+pub mod fill;
+pub mod irradiance;
 mod surface;
 mod vertices;
 

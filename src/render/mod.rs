@@ -3,9 +3,12 @@
 //! Each pixel is sampled on a regular grid, the same for every pixel and every run. A sample sees
 //! the nearest face; sides that do not radiate are black, and so is what lies beyond the scene.
 //! Radiance is (E + rho H)/pi with E and rho averaged over the sample's footprint (so textures are
-//! filtered, not point-sampled) and H either interpolated between vertices or gathered.
+//! filtered, not point-sampled) and H either interpolated between vertices or gathered, once for each
+//! root in a pixel.
 
 mod camera_rays;
+
+use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -13,12 +16,17 @@ use rayon::prelude::*;
 use crate::error::Result;
 use crate::mesh::Face;
 use crate::monitor::Monitor;
-use crate::operator::walk::Walker;
+use crate::reconstruct::fill::RootPoints;
+use crate::reconstruct::irradiance::{IrradianceCounts, changes, irradiances};
 use crate::reconstruct::{Surface, VertexIrradiance};
 use crate::scene::{self, Camera, Scene};
 use crate::solve::Light;
 
 pub use camera_rays::{CameraRays, Ray};
+
+/// About how many pixels are gathered together: what lies between is filled in, and is held in
+/// memory.
+const BAND: usize = 1 << 21;
 
 /// What is drawn, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,13 +37,60 @@ pub struct RenderOptions {
     pub height: u32,
     /// Samples along each side of a pixel, at least 1.
     pub samples: u32,
-    /// Whether irradiance is gathered with exact visibility, once for each face in a pixel, instead
-    /// of interpolated between the vertices of the elements.
+    /// Whether irradiance is gathered with exact visibility instead of interpolated between the
+    /// vertices of the elements. Light that was made to a tolerance is always gathered.
     pub gather: bool,
 }
 
-/// Radiance of each pixel, W/(m^2 sr), row by row from the top left.
+/// Radiance of each pixel, W/(m^2 sr), row by row from the top left; and how much was gathered for
+/// it.
 pub fn render(
+    scene: &Scene,
+    light: &Light,
+    camera: &Camera,
+    options: &RenderOptions,
+    monitor: &Monitor,
+) -> Result<(Vec<[f32; 3]>, IrradianceCounts)> {
+    let surface = Surface::new(scene, &light.mesh);
+    let mut painter = Painter::new(scene, light, camera, options, &surface);
+    if options.gather || light.apart().is_some() {
+        let mut counts = IrradianceCounts::default();
+        let pixels = painter.gathered(
+            options,
+            |asked| {
+                let (values, own) = irradiances(light, asked, monitor)?;
+                counts += own;
+                Ok(values)
+            },
+            |patch| patch.reflectance != DVec3::ZERO,
+            |patch, irradiance| {
+                (patch.exitance + patch.reflectance * irradiance) / std::f64::consts::PI
+            },
+            monitor,
+        )?;
+        return Ok((pixels, counts));
+    }
+    painter.vertices = Some(VertexIrradiance::new(&light.mesh, &light.solution.irradiance));
+    let stage = monitor.stage("render", u64::from(options.height));
+    let share = f64::from(painter.rays.samples.pow(2)) * std::f64::consts::PI;
+    let rows: Vec<Vec<[f32; 3]>> = (0..options.height)
+        .into_par_iter()
+        .map(|y| {
+            let pixel = |x| {
+                let sum: DVec3 = painter.patches(x, y).iter().map(|p| p.radiosity).sum();
+                (sum / share).as_vec3().to_array()
+            };
+            let row = (0..options.width).map(pixel).collect();
+            stage.advance(1)?;
+            Ok(row)
+        })
+        .collect::<Result<_>>()?;
+    Ok((rows.concat(), IrradianceCounts::default()))
+}
+
+/// The estimated error of the irradiance at each pixel, relative to its mean over the surface, for
+/// light that was made to a tolerance; 0 for other light.
+pub fn error_map(
     scene: &Scene,
     light: &Light,
     camera: &Camera,
@@ -43,26 +98,18 @@ pub fn render(
     monitor: &Monitor,
 ) -> Result<Vec<[f32; 3]>> {
     let surface = Surface::new(scene, &light.mesh);
-    let painter = Painter {
-        scene,
-        light,
-        surface: &surface,
-        rays: CameraRays::new(camera, options.width, options.height, options.samples.max(1)),
-        vertices: VertexIrradiance::new(&light.mesh, &light.solution.irradiance),
-        gather: options.gather,
-    };
-    let stage = monitor.stage("render", u64::from(options.height));
-    let rows: Vec<Vec<[f32; 3]>> = (0..options.height)
-        .into_par_iter()
-        .map_init(Walker::default, |walker, y| {
-            // Asked at every pixel: a wide row of gathered samples takes minutes.
-            let pixel = |x| monitor.check().map(|()| painter.pixel(walker, x, y));
-            let row = (0..options.width).map(pixel).collect::<Result<_>>()?;
-            stage.advance(1)?;
-            Ok(row)
-        })
-        .collect::<Result<_>>()?;
-    Ok(rows.concat())
+    let painter = Painter::new(scene, light, camera, options, &surface);
+    let estimate = light.apart().map(|source| source.estimate);
+    let scale = estimate.map_or(DVec3::ZERO, |e| {
+        DVec3::select(e.mean.cmpgt(DVec3::ZERO), e.of_change / e.mean, DVec3::ZERO)
+    });
+    painter.gathered(
+        options,
+        |asked| changes(light, asked, monitor),
+        |_| true,
+        |patch, change| patch.count * scale * change,
+        monitor,
+    )
 }
 
 struct Painter<'a> {
@@ -70,13 +117,13 @@ struct Painter<'a> {
     light: &'a Light,
     surface: &'a Surface<'a>,
     rays: CameraRays,
-    vertices: VertexIrradiance,
-    gather: bool,
+    /// Where irradiance is interpolated.
+    vertices: Option<VertexIrradiance>,
 }
 
-/// All samples of one pixel that see one face.
+/// All samples of one pixel that see one root.
 struct Patch {
-    face: u32,
+    root: u32,
     /// Sum of their points in the face's plane.
     place: DVec2,
     count: f64,
@@ -86,34 +133,105 @@ struct Patch {
     radiosity: DVec3,
 }
 
-impl Painter<'_> {
-    fn pixel(&self, walker: &mut Walker, x: u32, y: u32) -> [f32; 3] {
+impl<'a> Painter<'a> {
+    fn new(
+        scene: &'a Scene,
+        light: &'a Light,
+        camera: &Camera,
+        options: &RenderOptions,
+        surface: &'a Surface<'a>,
+    ) -> Painter<'a> {
+        let rays = CameraRays::new(camera, options.width, options.height, options.samples.max(1));
+        Painter { scene, light, surface, rays, vertices: None }
+    }
+
+    /// Pixels as sums over their patches of what `compose` makes of a patch and of the value that
+    /// `gather` finds in the middle of it (where `wants` it: zero elsewhere).
+    fn gathered(
+        &self,
+        options: &RenderOptions,
+        mut gather: impl FnMut(&[RootPoints]) -> Result<Vec<Vec<DVec3>>>,
+        wants: impl Fn(&Patch) -> bool,
+        compose: impl Fn(&Patch, DVec3) -> DVec3,
+        monitor: &Monitor,
+    ) -> Result<Vec<[f32; 3]>> {
+        let samples = self.rays.samples.pow(2);
+        let rows_at_once = (BAND as u32 / options.width.max(1)).max(1);
+        let mut pixels = vec![];
+        for first in (0..options.height).step_by(rows_at_once as usize) {
+            let rows = first..(first + rows_at_once).min(options.height);
+            let (patches, ends) = self.band(rows, options.width, monitor)?;
+            let mut asked: Vec<RootPoints> = vec![];
+            let mut group = vec![None; self.light.mesh.roots.len()];
+            // Where the value of each patch will be.
+            let places: Vec<Option<(usize, usize)>> = patches
+                .iter()
+                .map(|patch| {
+                    wants(patch).then(|| {
+                        let own = *group[patch.root as usize].get_or_insert_with(|| {
+                            asked.push(RootPoints { root: patch.root, points: vec![] });
+                            asked.len() - 1
+                        });
+                        // A root is convex: the mean of points on it lies on it.
+                        asked[own].points.push(patch.place / patch.count);
+                        (own, asked[own].points.len() - 1)
+                    })
+                })
+                .collect();
+            let values = gather(&asked)?;
+            let mut begin = 0;
+            for end in ends {
+                let sum: DVec3 = (begin..end)
+                    .map(|k| {
+                        let value = places[k].map_or(DVec3::ZERO, |(own, k)| values[own][k]);
+                        compose(&patches[k], value)
+                    })
+                    .sum();
+                pixels.push((sum / f64::from(samples)).as_vec3().to_array());
+                begin = end;
+            }
+        }
+        Ok(pixels)
+    }
+
+    /// The patches of the pixels of some rows, and where those of each pixel end.
+    fn band(
+        &self,
+        rows: Range<u32>,
+        width: u32,
+        monitor: &Monitor,
+    ) -> Result<(Vec<Patch>, Vec<usize>)> {
+        let stage = monitor.stage("look", u64::from(rows.end - rows.start));
+        let found: Vec<Vec<Vec<Patch>>> = rows
+            .into_par_iter()
+            .map(|y| {
+                stage.advance(1)?;
+                Ok((0..width).map(|x| self.patches(x, y)).collect())
+            })
+            .collect::<Result<_>>()?;
+        let (mut patches, mut ends) = (vec![], vec![]);
+        for pixel in found.into_iter().flatten() {
+            patches.extend(pixel);
+            ends.push(patches.len());
+        }
+        Ok((patches, ends))
+    }
+
+    /// What the samples of a pixel see.
+    fn patches(&self, x: u32, y: u32) -> Vec<Patch> {
         let mut patches: Vec<Patch> = vec![];
         let across = self.rays.samples;
         for j in 0..across {
             for i in 0..across {
                 if let Some(sample) = self.sample(self.rays.sample(x, y, i, j)) {
-                    match patches.iter_mut().find(|p| p.face == sample.face) {
+                    match patches.iter_mut().find(|p| p.root == sample.root) {
                         Some(patch) => patch.join(&sample),
                         None => patches.push(sample),
                     }
                 }
             }
         }
-        let mut sum = DVec3::ZERO;
-        for patch in &patches {
-            if self.gather && patch.reflectance != DVec3::ZERO {
-                // A face is convex: the mean of points on it lies on it.
-                let frame = &self.light.mesh.faces[patch.face as usize].frame;
-                let point = frame.lift(patch.place / patch.count);
-                let irradiance = self.light.irradiance(walker, point, frame.n);
-                sum += patch.exitance + patch.reflectance * irradiance;
-            } else {
-                sum += patch.radiosity;
-            }
-        }
-        let radiance = sum / (f64::from(across * across) * std::f64::consts::PI);
-        radiance.as_vec3().to_array()
+        patches
     }
 
     /// What one ray sees; `None` for what is black or beyond the scene.
@@ -123,16 +241,17 @@ impl Painter<'_> {
         let mesh = &self.light.mesh;
         let face = &mesh.faces[index as usize];
         let place = face.frame.project(ray.origin + met.t * ray.direction);
+        let root = mesh.root_at(index as usize, place);
         let footprint = footprint(face, &ray, place);
         let triangle = met.triangle as usize;
         let exitance = scene::exitance(self.scene, triangle, &footprint);
         let reflectance = scene::reflectance(self.scene, triangle, &footprint);
         let mut radiosity = exitance;
-        if !self.gather {
-            let element = mesh.locate(index as usize, place);
-            radiosity += reflectance * self.vertices.at(mesh, element, place);
+        if let Some(vertices) = &self.vertices {
+            radiosity += reflectance * vertices.at(mesh, mesh.locate_in(root, place), place);
         }
-        Some(Patch { face: index, place, count: 1.0, exitance, reflectance, radiosity })
+        let root = root as u32;
+        Some(Patch { root, place, count: 1.0, exitance, reflectance, radiosity })
     }
 }
 

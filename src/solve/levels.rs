@@ -36,14 +36,35 @@ const MOST_REPEATS: u64 = 3;
 /// How to solve.
 #[derive(Clone, Copy)]
 pub struct FastSolve<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
+    /// Where the iteration starts.
+    pub start: Start<'a>,
     /// The operator.
     pub fast: FastOptions,
     /// Stopping.
     pub solve: SolveOptions,
     /// Bytes that the operator may take.
     pub max_memory: u64,
+}
+
+/// What is known of a solution before it is sought.
+#[derive(Clone, Copy)]
+pub enum Start<'a> {
+    /// Nothing: coarser meshes are solved on first, with the lights of the scene.
+    Scene(&'a Scene),
+    /// Nothing, and it is not worth a coarser mesh.
+    Unknown,
+    /// A solution on a coarser mesh with the same roots.
+    Coarse(&'a Coarse<'a>),
+}
+
+/// A solution on a mesh.
+pub struct Coarse<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// Its clusters.
+    pub clusters: &'a Clusters,
+    /// The solution.
+    pub solution: &'a Solution,
 }
 
 /// A solution and its operator.
@@ -163,15 +184,17 @@ fn expect(stage: Stage, how: &FastSolve, monitor: &Monitor) -> Result<Expected> 
         largest_irradiance: 0.0,
         guess: None,
     };
-    if mesh.elements() <= COARSEST {
-        return Ok(unknown(clusters.len()));
-    }
+    let scene = match how.start {
+        Start::Coarse(coarse) => return Ok(known_from(stage, coarse)),
+        Start::Scene(scene) if mesh.elements() > COARSEST => scene,
+        Start::Scene(_) | Start::Unknown => return Ok(unknown(clusters.len())),
+    };
     let coarse = mesh.coarsened(STEP)?;
     if 2 * coarse.elements() > mesh.elements() {
         return Ok(unknown(clusters.len()));
     }
     let coarse_clusters = Clusters::build(&coarse);
-    let (reflectance, exitance) = mesh::appearance(how.scene, &coarse);
+    let (reflectance, exitance) = mesh::appearance(scene, &coarse);
     let tolerance = (LOOSER * how.fast.tolerance).min(1e-2);
     let looser = FastSolve {
         fast: FastOptions { tolerance, ..how.fast },
@@ -180,14 +203,19 @@ fn expect(stage: Stage, how: &FastSolve, monitor: &Monitor) -> Result<Expected> 
     };
     let coarse_stage = Stage { mesh: &coarse, clusters: &coarse_clusters, occluders };
     let solved = solve_fast(coarse_stage, &reflectance, &exitance, &looser, monitor)?;
-    let radiosity = &solved.solution.radiosity;
+    let solution = &solved.solution;
+    Ok(known_from(stage, &Coarse { mesh: &coarse, clusters: &coarse_clusters, solution }))
+}
+
+fn known_from(stage: Stage, coarse: &Coarse) -> Expected {
+    let radiosity = &coarse.solution.radiosity;
     let values: Vec<[f64; 3]> = radiosity.iter().map(|u| u.to_array()).collect();
-    let known = deviations(&coarse, &coarse_clusters, &values);
-    Ok(Expected {
-        deviation: refined(stage, (&coarse, &coarse_clusters), &known),
-        largest_irradiance: largest_irradiance(&solved.solution),
-        guess: Some(prolonged(mesh, &coarse, radiosity)),
-    })
+    let known = deviations(coarse.mesh, coarse.clusters, &values);
+    Expected {
+        deviation: refined(stage, (coarse.mesh, coarse.clusters), &known),
+        largest_irradiance: largest_irradiance(coarse.solution),
+        guess: Some(prolonged(stage.mesh, coarse.mesh, radiosity)),
+    }
 }
 
 /// Deviations on a finer mesh: those of the coarser one where it has clusters of elements; below,
@@ -229,7 +257,7 @@ fn refined(
 }
 
 /// A coarse solution at the nodes of the finer mesh.
-fn prolonged(mesh: &Mesh, coarse: &Mesh, values: &[DVec3]) -> Vec<DVec3> {
+pub fn prolonged(mesh: &Mesh, coarse: &Mesh, values: &[DVec3]) -> Vec<DVec3> {
     let basis = mesh.basis;
     (0..mesh.nodes())
         .into_par_iter()

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use super::levels::{FastSolve, largest_irradiance, solve_fast};
+use super::levels::{FastSolve, Start, largest_irradiance, solve_fast};
+use super::within::Estimate;
 use super::{Solution, SolveOptions, solve};
 use crate::cluster::Clusters;
 use crate::error::{Error, Result};
@@ -10,13 +11,14 @@ use crate::mesh::{self, Mesh, MeshOptions};
 use crate::monitor::Monitor;
 use crate::operator::clustered::ClusteredSource;
 use crate::operator::fast::FitSource;
+use crate::operator::gather::Radiant;
 use crate::operator::walk::{Stage, Walker, gather};
 use crate::operator::{Operator, OperatorKind};
 use crate::scene::Scene;
 use crate::visibility::Occluders;
 
 /// From so many roots on, memory is forecast before the fast operator is built.
-const FORECAST_FROM: usize = 2000;
+pub(super) const FORECAST_FROM: usize = 2000;
 
 /// How a scene is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +48,7 @@ pub struct Light {
     /// Radiosity and irradiance at the nodes.
     pub solution: Solution,
     /// The radiosity made ready for gathering as the operator does.
-    source: Source,
+    pub(super) source: Source,
     /// Bytes that were forecast for the operator before it was built, where that was done.
     pub forecast: Option<u64>,
     /// Pairs of a node and an element that the operator stores.
@@ -63,10 +65,31 @@ pub struct Light {
 }
 
 /// A solution as points gather it.
-enum Source {
+pub(super) enum Source {
     Exact,
     Fits(FitSource),
     Clustered(ClusteredSource),
+    Apart(Box<ApartSource>),
+}
+
+/// A solution with direct light apart, made to a tolerance.
+pub struct ApartSource {
+    /// What emits: E.
+    pub emitters: Radiant,
+    /// What is reflected: rho H.
+    pub reflected: Radiant,
+    /// The same from the next coarser mesh, where there was one: what changed tells the error.
+    pub coarser: Option<Radiant>,
+    /// Errors that a cell may make in gathering reflected light, W/m^2.
+    pub allowed: f64,
+    /// Those in gathering emitted light.
+    pub allowed_direct: f64,
+    /// What is known of the error.
+    pub estimate: Estimate,
+    /// What was asked for.
+    pub tolerance: f64,
+    /// Why that was not reached, where it was not.
+    pub shortfall: Option<String>,
 }
 
 /// Meshes a scene, builds the operator and solves for its light.
@@ -97,8 +120,12 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     }
     let (operator, solution, receives, left_out) = match options.operator {
         OperatorKind::Fast(fast) => {
-            let how =
-                FastSolve { scene, fast, solve: options.solve, max_memory: options.max_memory };
+            let how = FastSolve {
+                start: Start::Scene(scene),
+                fast,
+                solve: options.solve,
+                max_memory: options.max_memory,
+            };
             let solved = solve_fast(stage, &reflectance, &exitance, &how, monitor)?;
             (solved.operator, solved.solution, solved.receives, solved.counts)
         }
@@ -112,12 +139,7 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     let mut counts = operator.counts();
     counts.extend(left_out);
     counts.push(("channels solved", solution.channels as u64));
-    let sums = operator.row_sums(mesh.nodes());
-    let row_sums = sums
-        .iter()
-        .enumerate()
-        .filter(|(node, _)| receives[mesh.element_root[node / mesh.basis.nodes()] as usize])
-        .fold((f64::MAX, f64::MIN), |(a, b), (_, &s)| (a.min(s), b.max(s)));
+    let row_sums = row_sums(&operator, &mesh, &receives);
     let radiosity = &solution.radiosity;
     let source = match options.operator {
         OperatorKind::Exact => Source::Exact,
@@ -146,10 +168,28 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     })
 }
 
+/// Smallest and largest sum of a row over pi, of roots that receive.
+pub(super) fn row_sums(operator: &Operator, mesh: &Mesh, receives: &[bool]) -> (f64, f64) {
+    operator
+        .row_sums(mesh.nodes())
+        .iter()
+        .enumerate()
+        .filter(|(node, _)| receives[mesh.element_root[node / mesh.basis.nodes()] as usize])
+        .fold((f64::MAX, f64::MIN), |(a, b), (_, &s)| (a.min(s), b.max(s)))
+}
+
 impl Light {
     /// The surface that points look at.
     pub fn stage(&self) -> Stage<'_> {
         Stage { mesh: &self.mesh, clusters: &self.clusters, occluders: &self.occluders }
+    }
+
+    /// What a light that was made to a tolerance is made of.
+    pub fn apart(&self) -> Option<&ApartSource> {
+        match &self.source {
+            Source::Apart(source) => Some(source),
+            _ => None,
+        }
     }
 
     /// Irradiance at a point with a unit normal, by gathering the solution with exact visibility,
@@ -158,6 +198,12 @@ impl Light {
         match &self.source {
             Source::Fits(source) => source.gather(walker, self.stage(), point, normal),
             Source::Clustered(source) => source.gather(walker, self.stage(), point, normal),
+            Source::Apart(source) => {
+                let direct = &source.emitters;
+                let stage = self.stage();
+                direct.gather(walker, stage, point, normal, source.allowed_direct)
+                    + source.reflected.gather(walker, stage, point, normal, source.allowed)
+            }
             Source::Exact => gather(walker, self.stage(), &self.solution.radiosity, point, normal),
         }
     }

@@ -1,9 +1,13 @@
 //! Solving (I - K) u = E: restarted GMRES, all colours in one product.
 
+pub mod apart;
 mod colours;
+pub mod direct;
 mod gmres;
 pub mod levels;
 pub mod light;
+pub mod samples;
+pub mod within;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,7 +18,8 @@ use crate::operator::Operator;
 
 pub use colours::Colours;
 pub use gmres::gmres;
-pub use light::{Light, LightOptions};
+pub use light::{ApartSource, Light, LightOptions};
+pub use within::{Estimate, WithinOptions, light_within};
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]

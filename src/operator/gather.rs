@@ -1,0 +1,183 @@
+//! Gathering by error: irradiance at any point from an adaptive field.
+//!
+//! A point looks at each cell as a whole first, and takes its linear fit where the error of that is
+//! below what is allowed: form factor times deviation, and times (R/d)^2 where the cell is fully
+//! visible, since the fit keeps the moments of degree 0 and 1 and what is left is G's curvature.
+//! Visibility is exact throughout. Integrals are no more precise than the cell's light asks for.
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
+
+use super::walk::{Scope, Stage, Walker};
+use crate::cluster::adaptive::Field;
+use crate::geometry::Pieces;
+use crate::kernel::{Moments, Precision};
+use crate::mesh::{Basis, child};
+use crate::visibility::Coverage;
+use crate::{gray, near};
+
+/// Precisions to choose from: relative errors 10^(-k/2).
+const PRECISIONS: usize = 25;
+
+/// Share of the error that a cell may make which its integral may.
+const OF_INTEGRAL: f64 = 0.25;
+
+/// What radiates, ready for gathering.
+pub struct Radiant {
+    /// Radiosity, W/m^2.
+    pub field: Field,
+    /// Faces that radiate.
+    faces: Vec<u32>,
+    precisions: Vec<Precision>,
+}
+
+/// A cell on the way down.
+#[derive(Clone, Copy)]
+pub(super) struct Cell<'a> {
+    pub number: u32,
+    pub corners: &'a [DVec2; 3],
+    /// Distance of its farthest corner from their mean, and its area.
+    pub radius: f64,
+    pub area: f64,
+}
+
+impl<'a> Cell<'a> {
+    /// A whole root.
+    pub fn root(stage: Stage<'a>, root: u32) -> Cell<'a> {
+        let corners = &stage.mesh.roots[root as usize].corners;
+        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius = corners.iter().map(|x| x.distance(centre)).fold(0.0, f64::max);
+        let area = 0.5 * (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]);
+        Cell { number: root, corners, radius, area }
+    }
+}
+
+impl Radiant {
+    /// Of the radiosity `field` on the roots of the stage's mesh.
+    pub fn new(stage: Stage, field: Field) -> Radiant {
+        let faces = (0..stage.mesh.faces.len() as u32)
+            .filter(|&f| {
+                let (begin, end) = stage.mesh.faces[f as usize].roots;
+                (begin..end).any(|root| !field.is_dark(root))
+            })
+            .collect();
+        let precisions =
+            (0..PRECISIONS).map(|k| Precision::within(10f64.powf(-0.5 * k as f64))).collect();
+        Radiant { field, faces, precisions }
+    }
+
+    /// Faces that radiate.
+    pub fn faces(&self) -> &[u32] {
+        &self.faces
+    }
+
+    /// Whether nothing radiates.
+    pub fn is_dark(&self) -> bool {
+        self.faces.is_empty()
+    }
+
+    /// Irradiance H = 1/pi int u G V at a point with the given unit normal. Each cell may add an
+    /// error of `allowed` (W/m^2) in each channel; 0 takes leaves and exact integrals.
+    pub fn gather(
+        &self,
+        walker: &mut Walker,
+        stage: Stage,
+        point: DVec3,
+        normal: DVec3,
+        allowed: f64,
+    ) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        let mut clip = std::mem::take(&mut walker.clip);
+        let only = (self.faces.len() < stage.mesh.faces.len()).then_some(&self.faces[..]);
+        walker.each_face(stage, point, normal, only, |walker, scope| {
+            for root in scope.face.roots.0..scope.face.roots.1 {
+                let cell = Cell::root(stage, root);
+                sum += self.descend(walker, scope, cell, 0, allowed, &mut clip);
+            }
+        });
+        walker.clip = clip;
+        sum / PI
+    }
+
+    /// int u G V over one cell; `active[from..]` are the shadows that may touch its parent.
+    pub(super) fn descend(
+        &self,
+        walker: &mut Walker,
+        scope: &Scope,
+        cell: Cell,
+        from: usize,
+        allowed: f64,
+        clip: &mut Pieces,
+    ) -> DVec3 {
+        let corners = cell.corners;
+        if self.field.is_dark(cell.number) || scope.horizon.nowhere_positive(corners) {
+            return DVec3::ZERO;
+        }
+        let to = walker.active.len();
+        if from < to && walker.shadows.narrow(corners, &mut walker.active, from) == Coverage::Hidden
+        {
+            walker.counts.hidden += 1;
+            return DVec3::ZERO;
+        }
+        let clear = walker.active.len() == to;
+        let view = &scope.view;
+        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let square = (centre - view.foot).length_squared() + view.d * view.d;
+        let distance = square.sqrt();
+        // A bound on cos/d^2 over the cell.
+        let nearest = distance - cell.radius;
+        let factor = if nearest > 0.0 {
+            cell.area * (view.d / nearest).min(1.0) / (PI * nearest * nearest)
+        } else {
+            f64::INFINITY
+        };
+        let curved = if clear { (cell.radius * cell.radius / square).min(1.0) } else { 1.0 };
+        let error = self.field.deviation[cell.number as usize] * factor.min(1.0) * curved;
+        let mut sum = DVec3::ZERO;
+        let below = (error > allowed).then(|| self.field.tree.children(cell.number)).flatten();
+        if let Some(first) = below {
+            for k in 0..4 {
+                let below = Cell {
+                    number: first + k,
+                    corners: &child(corners, k as usize),
+                    radius: 0.5 * cell.radius,
+                    area: 0.25 * cell.area,
+                };
+                sum += self.descend(walker, scope, below, to, allowed, clip);
+            }
+        } else {
+            let fit = &self.field.fits[cell.number as usize];
+            let size = fit.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
+            let precision =
+                self.precision(OF_INTEGRAL * allowed * PI * square / (cell.area * size));
+            let m = if clear {
+                walker.counts.near += 1;
+                near::moments(view, &scope.horizon, corners, precision, clip)
+            } else {
+                let pieces = walker.shadows.visible(corners, &walker.active[to..]);
+                walker.counts.gray += u64::from(!pieces.is_empty());
+                walker.counts.hidden += u64::from(pieces.is_empty());
+                gray::moments(view, &scope.horizon, corners, pieces, precision, clip)
+            };
+            if m != Moments::default() {
+                let c = near::coefficients(m, corners, Basis::Linear);
+                for (value, c) in fit.iter().zip(c) {
+                    sum += c * DVec3::from_array(*value);
+                }
+            }
+        }
+        walker.active.truncate(to);
+        sum
+    }
+
+    /// The coarsest precision with relative errors of at most `bound`.
+    fn precision(&self, bound: f64) -> &Precision {
+        let k = (-2.0 * bound.log10()).ceil();
+        if k < PRECISIONS as f64 {
+            &self.precisions[k.max(0.0) as usize]
+        } else {
+            &Precision::EXACT
+        }
+    }
+}

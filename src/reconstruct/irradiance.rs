@@ -1,0 +1,130 @@
+//! Irradiance at many points at once.
+
+use glam::{DVec2, DVec3};
+
+use super::fill::{FillCounts, RootPoints, fill};
+use crate::error::Result;
+use crate::monitor::Monitor;
+use crate::operator::beam::{Beam, Patch};
+use crate::operator::gather::Radiant;
+use crate::solve::Light;
+
+/// Where light is filled in, what is checked may be off by this much, in units of the tolerance
+/// times the mean irradiance. What is filled in is about eight times better: the root mean square
+/// measured over the shipped scenes was 0.1 to 0.2 units, over rooms
+/// with strong contrasts 0.3.
+const CHECKED: f64 = 2.0;
+
+/// What was done for direct and for indirect light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct IrradianceCounts {
+    /// Emitted light that arrives straight away (all light, where a solution does not tell it apart).
+    pub direct: FillCounts,
+    /// Reflected light.
+    pub indirect: FillCounts,
+}
+
+impl std::ops::AddAssign for IrradianceCounts {
+    fn add_assign(&mut self, other: IrradianceCounts) {
+        for (own, more) in [(&mut self.direct, other.direct), (&mut self.indirect, other.indirect)]
+        {
+            own.points += more.points;
+            own.gathered += more.gathered;
+            own.squares += more.squares;
+        }
+    }
+}
+
+impl IrradianceCounts {
+    /// Root mean square error over the points that filling in is expected to have made, relative to
+    /// the `mean` irradiance; of the channels the largest.
+    pub fn error(&self, mean: DVec3) -> f64 {
+        let squares = (self.direct.squares + self.indirect.squares)
+            / self.direct.points.max(self.indirect.points).max(1) as f64;
+        let relative = DVec3::select(mean.cmpgt(DVec3::ZERO), squares / (mean * mean), squares);
+        relative.max_element().sqrt()
+    }
+}
+
+/// Irradiance (W/m^2) at points of roots, in the order given; the normals are those of the faces.
+///
+/// Light that was made to a tolerance ([`crate::solve::light_within`]) is gathered where it has to
+/// be, and filled in where it is smooth; other light is gathered at every point.
+pub fn irradiances(
+    light: &Light,
+    asked: &[RootPoints],
+    monitor: &Monitor,
+) -> Result<(Vec<Vec<DVec3>>, IrradianceCounts)> {
+    let Some(source) = light.apart() else {
+        let place = |root: u32, x: DVec2| {
+            let frame = &light.mesh.faces[light.mesh.roots[root as usize].face as usize].frame;
+            (frame.lift(x), frame.n)
+        };
+        let (values, direct) = fill(
+            &light.mesh,
+            asked,
+            0.0,
+            |_, _, _| (),
+            |walker, (), root, x| {
+                let (point, normal) = place(root, x);
+                light.irradiance(walker, point, normal)
+            },
+            monitor,
+        )?;
+        return Ok((values, IrradianceCounts { direct, ..IrradianceCounts::default() }));
+    };
+    let checked = CHECKED * source.tolerance * source.estimate.mean.max_element();
+    let from = |radiant, allowed| from_radiant(light, radiant, (allowed, checked), asked, monitor);
+    let (mut values, direct) = from(&source.emitters, source.allowed_direct)?;
+    let (reflected, indirect) = from(&source.reflected, source.allowed)?;
+    for (sum, more) in values.iter_mut().flatten().zip(reflected.into_iter().flatten()) {
+        *sum += more;
+    }
+    Ok((values, IrradianceCounts { direct, indirect }))
+}
+
+/// What reflected light changed by from the next coarser solution to this one, at points of roots:
+/// what the error is estimated from. Nothing where there was no coarser one.
+pub fn changes(light: &Light, asked: &[RootPoints], monitor: &Monitor) -> Result<Vec<Vec<DVec3>>> {
+    let zero = || asked.iter().map(|own| vec![DVec3::ZERO; own.points.len()]).collect();
+    let Some(source) = light.apart() else { return Ok(zero()) };
+    let Some(coarser) = &source.coarser else { return Ok(zero()) };
+    let checked = CHECKED * source.tolerance * source.estimate.mean.max_element();
+    let from = |radiant| {
+        from_radiant(light, radiant, (source.allowed, checked), asked, monitor).map(|(v, _)| v)
+    };
+    let (mut values, before) = (from(&source.reflected)?, from(coarser)?);
+    for (value, before) in values.iter_mut().flatten().zip(before.into_iter().flatten()) {
+        *value = (*value - before).abs();
+    }
+    Ok(values)
+}
+
+fn from_radiant(
+    light: &Light,
+    radiant: &Radiant,
+    (allowed, checked): (f64, f64),
+    asked: &[RootPoints],
+    monitor: &Monitor,
+) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
+    let stage = light.stage();
+    let frame = |root: u32| &light.mesh.faces[light.mesh.roots[root as usize].face as usize].frame;
+    fill(
+        &light.mesh,
+        asked,
+        checked,
+        |root, corners, around: Option<&Beam>| {
+            let frame = frame(root);
+            let patch = Patch::new(corners.map(|x| frame.lift(x)), frame.n);
+            match around {
+                Some(beam) => beam.narrowed(radiant, stage, &patch, allowed),
+                None => Beam::new(radiant, stage, &patch, allowed),
+            }
+        },
+        |walker, beam, root, x| {
+            let frame = frame(root);
+            beam.gather(radiant, walker, stage, frame.lift(x), frame.n, allowed)
+        },
+        monitor,
+    )
+}
