@@ -13,8 +13,8 @@ pub(super) const FRONT: u8 = 1;
 /// Its other side.
 pub(super) const BACK: u8 = 2;
 
-/// Most parts of one triangle: far more than floors have under what lies on them, and each becomes
-/// at least one element.
+/// Most convex parts of one triangle: far more than floors have under what lies on them (letters on
+/// a plate are about as many as their corners), and each becomes an element or several.
 pub(super) const MOST_PARTS: usize = 2048;
 
 /// Parts less high than this share of the contact distance are dropped, and leave a slit of that
@@ -139,11 +139,11 @@ impl Tree {
             }
             self.leaves[place] = last;
             inside(&mut self.nodes[last]);
-            if self.leaves.len() > MOST_PARTS {
-                return None;
-            }
         }
-        Some(())
+        // What has no side left is cut no more.
+        let Tree { nodes, leaves, .. } = self;
+        leaves.retain(|&leaf| nodes[leaf].sides != 0);
+        (leaves.len() <= MOST_PARTS).then_some(())
     }
 
     fn parts(mut self, triangle: &[DVec3; 3]) -> Vec<Part> {
