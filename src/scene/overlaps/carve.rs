@@ -44,6 +44,11 @@ pub(super) struct Part {
 }
 
 impl Part {
+    /// Whether it is all of a triangle that had `sides`.
+    pub fn is_whole(&self, sides: u8) -> bool {
+        self.sides == sides && self.corners.iter().all(|c| c.weights.max_element() == 1.0)
+    }
+
     /// The part of `whole` that it is.
     pub fn of(&self, whole: &Triangle) -> Triangle {
         let colour = |c: &Corner| c.weights.to_array().into_iter().zip(whole.colour);
@@ -67,8 +72,7 @@ struct Node {
     halves: Option<[usize; 2]>,
 }
 
-/// What is left of a triangle with `sides` that others cover. One part of all sides is the
-/// triangle itself; `None` when there are too many.
+/// What is left of a triangle with `sides` that others cover; `None` when that is too many parts.
 pub(super) fn carve(
     triangle: &[DVec3; 3],
     sides: u8,
@@ -91,7 +95,7 @@ pub(super) fn carve(
     for cover in covers.iter().filter(|c| c.dark != 0) {
         tree.cover(plate(cover)?, cover.dark, |n| n.sides &= !(cover.dark & !n.spared))?;
     }
-    Some(tree.parts(triangle))
+    Some(tree.parts())
 }
 
 struct Tree {
@@ -146,7 +150,7 @@ impl Tree {
         (leaves.len() <= MOST_PARTS).then_some(())
     }
 
-    fn parts(mut self, triangle: &[DVec3; 3]) -> Vec<Part> {
+    fn parts(mut self) -> Vec<Part> {
         // Halves come after what they are halves of.
         for i in (0..self.nodes.len()).rev() {
             if let Some([a, b]) = self.nodes[i].halves
@@ -173,7 +177,8 @@ impl Tree {
             for t in convex::triangulate(&node.corners) {
                 let corners = t.map(|k| node.corners[k]);
                 let x = corners.map(|c| c.x);
-                if convex::height(&x) > least || x == *triangle {
+                // The triangle itself is never dropped, however thin it is.
+                if convex::height(&x) > least || i == 0 {
                     parts.push(Part { corners, sides: node.sides });
                 }
             }

@@ -98,7 +98,7 @@ pub fn resolve(scene: &mut Scene) {
             }
             match carve(&scene.triangles[i].vertices, sides, &covers[i], &plates, tolerance) {
                 None => Carved::Left,
-                Some(parts) if parts.len() == 1 && parts[0].sides == sides => Carved::Whole,
+                Some(parts) if parts[..].iter().any(|p| p.is_whole(sides)) => Carved::Whole,
                 Some(parts) => Carved::Parts(parts),
             }
         })
