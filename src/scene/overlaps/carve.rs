@@ -4,6 +4,7 @@
 //! edge of a covering triangle. In the end, parts that came from one and fared alike are one again.
 
 use super::super::Triangle;
+use super::outline::{Outline, outlines};
 use super::pairs::Plate;
 use crate::geometry::convex::{self, Corner};
 use glam::{DVec2, DVec3};
@@ -82,18 +83,29 @@ pub(super) fn carve(
 ) -> Option<Vec<Part>> {
     let root = Node { corners: convex::whole(triangle), sides, spared: 0, halves: None };
     let mut tree = Tree { nodes: vec![root], leaves: vec![0], tolerance };
-    let plate = |c: &Cover| plates[c.by as usize].as_ref();
+    let [a, b, c] = *triangle;
+    let normal = (b - a).cross(c - a).normalize_or_zero();
+    // What does the same is taken together.
+    let alike = |what: &dyn Fn(&Cover) -> u8| -> Vec<(u8, Vec<Outline>)> {
+        let of = |sides: u8| {
+            let its = covers.iter().filter(|c| what(c) == sides);
+            let its = its.filter_map(|c| plates[c.by as usize].as_ref().map(|p| p.corners));
+            (sides, outlines(&its.collect::<Vec<_>>(), normal, tolerance))
+        };
+        [FRONT, BACK, FRONT | BACK].into_iter().map(of).collect()
+    };
+    let dark = alike(&|c| c.dark);
     // What is spared must be known before it gets dark.
-    if covers.iter().any(|c| c.dark != 0) {
-        for cover in covers.iter().filter(|c| c.spared != 0) {
-            tree.cover(plate(cover)?, cover.spared, |n| n.spared |= cover.spared)?;
+    if dark.iter().any(|(_, outlines)| !outlines.is_empty()) {
+        for (sides, outlines) in alike(&|c| c.spared) {
+            tree.cover(&outlines, sides, |n| n.spared |= sides)?;
         }
     }
-    for cover in covers.iter().filter(|c| c.lost != 0) {
-        tree.cover(plate(cover)?, cover.lost, |n| n.sides &= !cover.lost)?;
+    for (sides, outlines) in alike(&|c| c.lost) {
+        tree.cover(&outlines, sides, |n| n.sides &= !sides)?;
     }
-    for cover in covers.iter().filter(|c| c.dark != 0) {
-        tree.cover(plate(cover)?, cover.dark, |n| n.sides &= !(cover.dark & !n.spared))?;
+    for (sides, outlines) in dark {
+        tree.cover(&outlines, sides, |n| n.sides &= !(sides & !n.spared))?;
     }
     Some(tree.parts())
 }
@@ -105,9 +117,23 @@ struct Tree {
 }
 
 impl Tree {
-    /// Cuts the leaves that have any of `sides` along the outline of `plate`, and does something
-    /// with those inside of it.
-    fn cover(&mut self, plate: &Plate, sides: u8, mut inside: impl FnMut(&mut Node)) -> Option<()> {
+    /// Cuts the leaves that have any of `sides` along `outlines`, and does something with those
+    /// inside of them. `None` when there are too many leaves.
+    fn cover(
+        &mut self,
+        outlines: &[Outline],
+        sides: u8,
+        mut inside: impl FnMut(&mut Node),
+    ) -> Option<()> {
+        outlines.iter().try_for_each(|outline| self.cover_one(outline, sides, &mut inside))
+    }
+
+    fn cover_one(
+        &mut self,
+        outline: &Outline,
+        sides: u8,
+        inside: &mut impl FnMut(&mut Node),
+    ) -> Option<()> {
         for place in 0..self.leaves.len() {
             let leaf = self.leaves[place];
             if self.nodes[leaf].sides & sides == 0 {
@@ -115,14 +141,14 @@ impl Tree {
             }
             let on = self.tolerance;
             let corners = &self.nodes[leaf].corners;
-            let beside = |k: usize| corners.iter().all(|c| plate.inside(k, c.x) <= on);
-            if (0..3).any(beside) {
+            let beside = |k: usize| corners.iter().all(|c| outline.inside(k, c.x) <= on);
+            if (0..outline.edges()).any(beside) {
                 continue;
             }
             let mut rest = corners.clone();
             let mut cuts = vec![];
-            for k in 0..3 {
-                let [within, outside] = convex::split(&rest, |x| plate.inside(k, x), on);
+            for k in 0..outline.edges() {
+                let [within, outside] = convex::split(&rest, |x| outline.inside(k, x), on);
                 if !outside.is_empty() {
                     rest = within;
                     cuts.push([rest.clone(), outside]);

@@ -32,6 +32,7 @@
 
 mod carve;
 mod order;
+mod outline;
 mod pairs;
 
 use std::collections::BTreeMap;
