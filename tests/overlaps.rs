@@ -174,20 +174,38 @@ fn rooms_with_rugs_a_hair_above_the_floor_are_closed() {
 fn the_higher_one_stays() {
     let small = turned(0.5, 0.5, 0.2, 0.3, 0.0);
     for (z, covered) in [(4e-7, 2), (-4e-7, 0)] {
-        let large = flat(0.2, 0.2, 0.8, 0.8, z);
-        let scene = resolved(&of(&[
-            (flat(0.0, 0.0, 1.0, 1.0, -1.0), ONE),
-            (flat(0.0, 0.0, 0.1, 0.1, 0.5), ONE),
-            (large, ONE),
-            (small, ONE),
-        ]));
-        assert_eq!(scene.overlaps.covered, covered, "{:?}", scene.overlaps);
-        let area = |object: u32| -> f64 {
-            let its = (0..scene.triangles.len()).filter(|&i| scene.triangles[i].object == object);
-            its.map(|i| scene.triangle_normal_and_area(i).1).sum()
-        };
-        let want = if covered > 0 { [0.36, 0.0] } else { [0.32, 0.04] };
-        assert!((area(2) - want[0]).abs() < 1e-12 && (area(3) - want[1]).abs() < 1e-12);
+        for large_first in [true, false] {
+            let large = flat(0.2, 0.2, 0.8, 0.8, z);
+            let far = flat(0.0, 0.0, 1.0, 1.0, -1.0);
+            let (first, second) = if large_first { (large, small) } else { (small, large) };
+            let scene = resolved(&of(&[(far, ONE), (first, ONE), (second, ONE)]));
+            assert_eq!(scene.overlaps.covered, covered, "{:?}", scene.overlaps);
+            let area = |object: u32| -> f64 {
+                let its = scene.triangles.iter().filter(|t| t.object == object);
+                its.map(|t| t.normal_and_area().1).sum()
+            };
+            let (of_large, of_small) = if large_first { (1, 2) } else { (2, 1) };
+            let want = if covered > 0 { [0.36, 0.0] } else { [0.32, 0.04] };
+            let got = [area(of_large), area(of_small)];
+            assert!((got[0] - want[0]).abs() + (got[1] - want[1]).abs() < 1e-12, "{got:?}");
+        }
+    }
+}
+
+/// From above and from below, what radiates in mid air covers what it covered before, once. (A hole
+/// through a sheet leaves the room closed.)
+fn check_sides(scene: &Scene, close: f64) {
+    let facing = |s: &Scene, up: f64| -> Vec<[DVec2; 3]> {
+        let near =
+            s.triangles.iter().filter(|t| t.vertices.iter().all(|x| (x.z - 0.5).abs() < 0.1));
+        let its = near.filter(|t| {
+            s.materials[t.material as usize].two_sided || up * t.normal_and_area().0.z > 0.0
+        });
+        its.map(|t| t.vertices.map(|x| x.truncate())).collect()
+    };
+    let done = resolved(scene);
+    for up in [1.0, -1.0] {
+        check_union(&facing(scene, up), &facing(&done, up), close);
     }
 }
 
@@ -209,11 +227,31 @@ fn sheets_on_sheets_are_closed_on_both_sides() {
         ("a hair below a plate", on_plate((raised(-1e-7), BOTH)), 1e-6),
     ] {
         check_closed(name, &scene, close, false);
+        check_sides(&scene, close);
     }
     // A one-sided cloth reaches over the table; its back there is black and seen from below.
     let inside = flat(0.3, 0.3, 0.6, 0.5, 0.5);
     for (name, cloth) in [("from above", inside), ("from below", down(inside))] {
-        check_closed(name, &with(&[(table, BOTH), (cloth, ONE)]), 1e-11, true);
+        let scene = with(&[(table, BOTH), (cloth, ONE)]);
+        check_closed(name, &scene, 1e-11, true);
+        check_sides(&scene, 1e-11);
+    }
+}
+
+/// Of two sheets the higher one keeps the side above, the lower one that below.
+#[test]
+fn what_is_higher_is_lower_from_behind() {
+    let (lower, higher) = (flat(0.2, 0.2, 0.8, 0.8, 0.5), flat(0.1, 0.1, 0.6, 0.6, 0.5 + 4e-7));
+    for order in [[0, 1], [1, 0]] {
+        let quads = order.map(|i| ([lower, higher][i], BOTH));
+        let scene = resolved(&with(&quads));
+        for t in scene.triangles.iter().filter(|t| t.object >= 6) {
+            if !scene.materials[t.material as usize].two_sided {
+                let high = order[t.object as usize - 6] == 1;
+                assert_eq!(t.normal_and_area().0.z > 0.0, high);
+            }
+        }
+        assert_eq!(scene.materials.len(), 3);
     }
 }
 
