@@ -71,6 +71,10 @@ impl Session {
         self.report.count("faces", scene.triangles.len());
         self.report.count("materials", scene.materials.len());
         self.report.count("cameras", scene.cameras.len());
+        self.report.count("overlaps in one plane", scene.overlaps.pairs);
+        self.report.count("faces cut where they overlap", scene.overlaps.cut);
+        self.report.count("faces covered by others", scene.overlaps.covered);
+        self.report.count("faces with overlaps left", scene.overlaps.left);
         self.report.add_notices(&scene.notices);
         Ok(scene)
     }

@@ -3,12 +3,15 @@
 pub mod bounds;
 pub mod box_tree;
 pub mod circle;
+pub mod contact;
+pub mod convex;
 pub mod frame;
 pub mod polygon;
 pub mod ray;
 
 pub use bounds::Bounds;
 pub use box_tree::BoxTree;
+pub use contact::{CONTACT, contact_distance, file_rounding};
 pub use frame::Frame;
 pub use polygon::{Linear, Pieces};
 

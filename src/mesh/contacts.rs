@@ -29,20 +29,8 @@ use super::arrangement::arrange;
 use super::pieces::{Cut, cut_along};
 use super::seams::Joins;
 use super::shape::improve;
-use crate::geometry::{Bounds, BoxTree, Frame};
+use crate::geometry::{Bounds, BoxTree, Frame, contact_distance};
 use crate::scene::Scene;
-
-/// Share of the scene's longest side within which faces touch.
-///
-/// Scene files hold f32 coordinates, so features meant to coincide lie up to 2^-24 of a coordinate
-/// apart, a few times that after a transform. 2^-20 (a hundredth of a millimetre in ten metres) is
-/// 16 times as much and far below anything modelled on purpose. When it bites, a line moves by at
-/// most this.
-pub const CONTACT: f64 = 1.0 / 1_048_576.0;
-
-/// The same for scenes far from the origin, relative to the largest coordinate: two units in the
-/// last place of f32.
-const FAR: f64 = 1.0 / 8_388_608.0;
 
 /// Triangles less high than this many tolerances are not cut: their pieces would be slivers of
 /// the size of roundings.
@@ -86,9 +74,9 @@ pub(super) fn find(
     joins: &Joins,
 ) -> (Vec<Option<Cut>>, Contacts) {
     let boxes: Vec<Bounds> = scene.triangles.iter().map(|t| Bounds::of(&t.vertices)).collect();
-    let tolerance = tolerance(&boxes);
     let tree = BoxTree::build(&boxes);
-    let extent = boxes.iter().fold(Bounds::EMPTY, |a, &b| a.union(b)).extent();
+    let all = boxes.iter().fold(Bounds::EMPTY, |a, &b| a.union(b));
+    let (tolerance, extent) = (contact_distance(all), all.extent());
     let finder = Finder { scene, faces, front, joins, boxes, tree, tolerance, extent };
     let found: Vec<(Option<Cut>, Contacts)> =
         (0..scene.triangles.len()).into_par_iter().map(|i| finder.cut(i)).collect();
@@ -101,13 +89,6 @@ pub(super) fn find(
         cut
     });
     (cuts.collect(), sum)
-}
-
-/// Distance in metres within which faces touch, see [`CONTACT`].
-fn tolerance(boxes: &[Bounds]) -> f64 {
-    let all = boxes.iter().fold(Bounds::EMPTY, |a, &b| a.union(b));
-    let magnitude = all.min.abs().max(all.max.abs()).max_element().max(0.0);
-    (CONTACT * all.extent()).max(FAR * magnitude)
 }
 
 struct Finder<'a> {

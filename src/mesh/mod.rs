@@ -18,9 +18,10 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::{Bounds, Frame};
 
+pub use crate::geometry::CONTACT;
 pub use appearance::appearance;
 pub use build::{MeshOptions, build};
-pub use contacts::{CONTACT, Contacts};
+pub use contacts::Contacts;
 pub use refine::{DEEPEST, Refinement, child, level_for};
 pub use seams::{Seam, Side};
 

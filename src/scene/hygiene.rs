@@ -34,7 +34,7 @@ pub(crate) fn clean(scene: &mut Scene) -> Result<()> {
         if !triangle.vertices.iter().all(|&p| is_position(p)) {
             return Err(Error::invalid(
                 &scene.path,
-                about(scene, triangle),
+                about(scene, triangle.object),
                 "a corner is not finite or beyond 1e30 m; check the transforms above it",
             ));
         }
@@ -55,7 +55,7 @@ pub(crate) fn clean(scene: &mut Scene) -> Result<()> {
     }
     let mut notices = Notices::default();
     for ((object, text), count) in counts {
-        notices.add_many(format!("object \"{}\"", object_name(scene, object)), text, count);
+        notices.add_many(about(scene, object), text, count);
     }
     scene.notices.extend(notices.into_list());
     let mut drop = drop.into_iter();
@@ -70,12 +70,9 @@ pub(crate) fn clean(scene: &mut Scene) -> Result<()> {
     Ok(())
 }
 
-fn object_name(scene: &Scene, object: u32) -> &str {
-    scene.objects.get(object as usize).map_or("", |o| &o.name)
-}
-
-fn about(scene: &Scene, triangle: &Triangle) -> String {
-    format!("object \"{}\"", object_name(scene, triangle.object))
+/// An object in words.
+pub(super) fn about(scene: &Scene, object: u32) -> String {
+    format!("object \"{}\"", scene.objects.get(object as usize).map_or("", |o| &o.name))
 }
 
 /// Whether a triangle has no area, see [`MIN_RELATIVE_HEIGHT`].

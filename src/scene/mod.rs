@@ -12,6 +12,7 @@
 //! | `uri` | files that a scene file refers to |
 //! | `overrides` | what the command line changes in materials |
 //! | `hygiene` | degenerate and duplicate triangles |
+//! | `overlaps` | faces that overlap in one plane |
 //! | `texture`, `appearance` | images, and averages of what varies over a surface |
 //! | `camera`, `default_view` | views |
 //! | `limits`, `notices` | bounds of what is accepted, and the list of oddities |
@@ -33,6 +34,7 @@ mod mtl;
 mod notices;
 mod obj_file;
 mod obj_text;
+mod overlaps;
 mod overrides;
 mod polygon;
 mod read;
@@ -47,6 +49,7 @@ pub use appearance::{exitance, reflectance};
 pub use camera::{Camera, Projection, look_at};
 pub use default_view::default_camera;
 pub use limits::MAX_REFLECTANCE;
+pub use overlaps::{Overlaps, resolve as resolve_overlaps};
 pub use overrides::Override;
 pub use read::{ReadOptions, read};
 pub use texture::{Texture, TextureUse, Wrap};
@@ -68,6 +71,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// What was odd in the input and what was made of it.
     pub notices: Vec<Notice>,
+    /// What was done about faces that overlap in one plane.
+    pub overlaps: Overlaps,
 }
 
 /// A named part of a scene.
