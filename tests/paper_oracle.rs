@@ -102,7 +102,7 @@ fn light_to_a_tolerance_is_right_at_each_point() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.gltf");
     let scene = read(&path, &ReadOptions::default()).unwrap();
     for (tolerance, bounds) in [(1e-3, [1e-5, 3e-5, 3e-2]), (1e-5, [3e-7, 2e-6, 5e-4])] {
-        let options = WithinOptions { tolerance, max_memory: u64::MAX };
+        let options = WithinOptions::new(tolerance, u64::MAX);
         let light = light_within(&scene, &options, &Monitor::silent()).unwrap();
         let errors = errors_of(&scene, &light);
         println!("{tolerance:e}: {:.1e} {:.1e} {:.1e}", errors.far, errors.near, errors.pointwise);

@@ -17,7 +17,7 @@ use lumel::output::machine;
 use lumel::reconstruct::fill::RootPoints;
 use lumel::reconstruct::irradiance::irradiances;
 use lumel::scene::{ReadOptions, read};
-use lumel::solve::{WithinOptions, light_within};
+use lumel::solve::{Way, WithinOptions, light_within};
 use lumel::{Error, Monitor, Result};
 use serde_json::{Value, json};
 
@@ -27,6 +27,17 @@ const CASES: [(&str, &[f64], f64); 3] = [
     ("paper", &[1e-2, 1e-3, 1e-4, 1e-5], 2e-6),
     ("room", &[3e-2, 1e-2, 3e-3, 1e-3, 3e-4], 1.5e-4),
 ];
+
+/// How meshes follow from each other.
+const WAYS: [&str; 3] = ["uniform", "adaptive", "iterated"];
+
+fn way_of(name: &str) -> Way {
+    match name {
+        "adaptive" => Way::Adaptive,
+        "iterated" => Way::Iterated,
+        _ => Way::Uniform,
+    }
+}
 
 /// Points along each side of a texel.
 const ACROSS: usize = 4;
@@ -122,11 +133,11 @@ fn file_of(scene: &str) -> PathBuf {
 
 /// Runs a case in this process; one line of JSON. Texels are compared with those in `reference`, or
 /// written there where that does not exist yet.
-fn run_here(scene: &str, tolerance: f64, reference: &Path) -> Result<Value> {
+fn run_here(scene: &str, way: &str, tolerance: f64, reference: &Path) -> Result<Value> {
     let monitor = Monitor::silent();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene);
     let scene = read(&path.with_extension("gltf"), &ReadOptions::default())?;
-    let options = WithinOptions { tolerance, max_memory: u64::MAX };
+    let options = WithinOptions { way: way_of(way), ..WithinOptions::new(tolerance, u64::MAX) };
     let light = light_within(&scene, &options, &monitor)?;
     let source = light.apart().ok_or_else(|| failed("no tolerance"))?;
     let solved = machine::cpu_seconds().unwrap_or(f64::NAN);
@@ -165,10 +176,10 @@ fn run_here(scene: &str, tolerance: f64, reference: &Path) -> Result<Value> {
 }
 
 /// Runs a case in a process of its own.
-fn run_apart(scene: &str, tolerance: f64, reference: &Path) -> Result<Value> {
+fn run_apart(scene: &str, way: &str, tolerance: f64, reference: &Path) -> Result<Value> {
     let own = std::env::current_exe().map_err(failed)?;
     let output = Command::new(own)
-        .args(["--case", scene, &tolerance.to_string()])
+        .args(["--case", scene, way, &tolerance.to_string()])
         .arg(reference)
         .output()
         .map_err(failed)?;
@@ -178,29 +189,31 @@ fn run_apart(scene: &str, tolerance: f64, reference: &Path) -> Result<Value> {
 
 fn main() -> Result<()> {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
-    if let [flag, scene, tolerance, reference] = &words[..]
+    if let [flag, scene, way, tolerance, reference] = &words[..]
         && flag == "--case"
     {
         let tolerance = tolerance.parse().unwrap_or(0.01);
-        println!("{}", run_here(scene, tolerance, Path::new(reference))?);
+        println!("{}", run_here(scene, way, tolerance, Path::new(reference))?);
         return Ok(());
     }
     println!(
-        "| scene | texels | tolerance | error rms | estimate | estimate / error | largest error | \
+        "| scene | texels | way | tolerance | error rms | estimate | estimate / error | largest error | \
          estimate of it | elements | gathers | CPU s | of it solving | memory MB |"
     );
-    println!("|---{}|", "|---".repeat(12));
+    println!("|---{}|", "|---".repeat(13));
     for (scene, tolerances, finest) in CASES {
         if !words.iter().all(|w| scene.contains(w.as_str())) {
             continue;
         }
         let reference = file_of(scene);
-        run_apart(scene, finest, &reference)?;
-        for &tolerance in tolerances {
-            let value = run_apart(scene, tolerance, &reference)?;
+        run_apart(scene, "uniform", finest, &reference)?;
+        for (way, &tolerance) in
+            WAYS.iter().flat_map(|way| tolerances.iter().map(move |t| (way, t)))
+        {
+            let value = run_apart(scene, way, tolerance, &reference)?;
             let number = |name: &str| value[name].as_f64().unwrap_or(f64::NAN);
             println!(
-                "| {scene} | {} | {} % | {:.2e} | {:.2e} | {:.1} | {:.1e} | {:.1e} | {} | {} | {:.2} | {:.2} | {:.0} |",
+                "| {scene} | {} | {way} | {} % | {:.2e} | {:.2e} | {:.1} | {:.1e} | {:.1e} | {} | {} | {:.2} | {:.2} | {:.0} |",
                 value["texels"],
                 100.0 * tolerance,
                 number("error"),

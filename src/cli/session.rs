@@ -98,7 +98,7 @@ impl Session {
         let light = self.clock.time("solve", || match settings.tolerance {
             Some(tolerance) => {
                 let max_memory = settings.max_memory.unwrap_or(u64::MAX);
-                light_within(scene, &WithinOptions { tolerance, max_memory }, monitor)
+                light_within(scene, &WithinOptions::new(tolerance, max_memory), monitor)
             }
             None => light::light(scene, &settings.light_options(), monitor),
         })?;

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::pieces::Cut;
-use super::refine::{Refinement, child, edge_for_count, level_for};
+use super::refine::{DEEPEST, Refinement, child, edge_for_count, level_for};
 use super::seams::{self, Joins};
 use super::{Basis, Face, Mesh, Root, contacts};
 use crate::error::{Error, Result};
@@ -81,6 +81,14 @@ impl Mesh {
     pub fn refined_to(&self, refinement: Refinement) -> Result<Mesh> {
         let mut roots = self.roots.clone();
         choose_levels(&mut roots, refinement);
+        let (element_root, element_corners) = elements(&mut roots)?;
+        Ok(Mesh { roots, element_root, element_corners, ..self.clone() })
+    }
+
+    /// The same surface, each root refined as often as its entry in `levels` says.
+    pub fn with_levels(&self, levels: &[u32]) -> Result<Mesh> {
+        let mut roots = self.roots.clone();
+        roots.iter_mut().zip(levels).for_each(|(r, &level)| r.level = level.min(DEEPEST));
         let (element_root, element_corners) = elements(&mut roots)?;
         Ok(Mesh { roots, element_root, element_corners, ..self.clone() })
     }

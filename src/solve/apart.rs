@@ -1,9 +1,10 @@
 //! One solution with direct light apart: a mesh, its operator, and what is ready for gathering.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::direct::{DirectField, Fineness};
-use super::levels::{Coarse, FastSolve, Start, solve_fast};
+use super::levels::{Coarse, FastSolve, Start, prolonged, solve_fast};
 use super::light::{Light, Source, row_sums};
 use super::{Solution, SolveOptions};
 use crate::cluster::Clusters;
@@ -11,8 +12,9 @@ use crate::error::Result;
 use crate::mesh::{self, Mesh};
 use crate::monitor::Monitor;
 use crate::operator::FastOptions;
+use crate::operator::beam::{Beam, Patch};
 use crate::operator::gather::Radiant;
-use crate::operator::walk::Stage;
+use crate::operator::walk::{Stage, Walker};
 use crate::scene::Scene;
 use crate::visibility::Occluders;
 
@@ -27,7 +29,13 @@ pub struct ApartOptions {
     pub solve: SolveOptions,
     /// Bytes that the operator may take.
     pub max_memory: u64,
+    /// Gather indirect light at the nodes from the coarser solution instead of solving; errors that a
+    /// cell may make, W/m^2.
+    pub sweep: Option<f64>,
 }
+
+/// Share of the squared difference between two solutions that is left where it is.
+const LEFT: f64 = 0.03;
 
 /// A solution with direct light apart.
 pub struct Apart {
@@ -41,9 +49,15 @@ pub struct Apart {
     reflectance: Vec<DVec3>,
     /// Direct irradiance at the nodes.
     direct: Vec<DVec3>,
+    counts: Vec<(&'static str, u64)>,
+    stored: Stored,
+}
+
+/// What is known of the operator that was solved with.
+#[derive(Clone, Default)]
+struct Stored {
     entries: usize,
     bytes: usize,
-    counts: Vec<(&'static str, u64)>,
     seconds: Vec<(&'static str, f64)>,
     row_sums: (f64, f64),
 }
@@ -66,43 +80,95 @@ impl Apart {
         let (reflectance, _) = mesh::appearance(scene, &mesh);
         let coarse =
             coarser.map(|c| Coarse { mesh: &c.mesh, clusters: &c.clusters, solution: &c.solution });
-        let how = FastSolve {
-            start: coarse.as_ref().map_or(Start::Unknown, Start::Coarse),
-            fast: options.fast,
-            solve: options.solve,
-            max_memory: options.max_memory,
-        };
         let first = field.first_reflection(&mesh);
-        let solved = solve_fast(stage, &reflectance, &first, &how, monitor)?;
-        let (entries, bytes) = (solved.operator.entries(), solved.operator.bytes());
-        let mut counts = solved.operator.counts();
-        counts.extend(&solved.counts);
-        counts.push(("channels solved", solved.solution.channels as u64));
-        counts.push(("cells of direct light", field.len() as u64));
-        let seconds = solved.operator.seconds();
-        let row_sums = row_sums(&solved.operator, &mesh, &solved.receives);
-        drop(solved.operator);
-        let solution = solved.solution;
+        let mut counts = vec![("cells of direct light", field.len() as u64)];
+        let (solution, stored) = match (coarser, options.sweep) {
+            (Some(coarser), Some(allowed)) => {
+                let w = coarser.swept(stage, allowed, monitor)?;
+                let reflected = first.iter().zip(&reflectance).zip(&w);
+                let radiosity = reflected.map(|((b, rho), w)| *b + *rho * *w).collect();
+                (Solution { radiosity, irradiance: w, ..coarser.solution.clone() }, None)
+            }
+            _ => {
+                let how = FastSolve {
+                    start: coarse.as_ref().map_or(Start::Unknown, Start::Coarse),
+                    fast: options.fast,
+                    solve: options.solve,
+                    max_memory: options.max_memory,
+                };
+                let solved = solve_fast(stage, &reflectance, &first, &how, monitor)?;
+                counts.extend(solved.operator.counts());
+                counts.extend(&solved.counts);
+                counts.push(("channels solved", solved.solution.channels as u64));
+                let stored = Stored {
+                    entries: solved.operator.entries(),
+                    bytes: solved.operator.bytes(),
+                    seconds: solved.operator.seconds(),
+                    row_sums: row_sums(&solved.operator, &mesh, &solved.receives),
+                };
+                (solved.solution, Some(stored))
+            }
+        };
+        let stored = stored.or_else(|| coarser.map(|c| c.stored.clone())).unwrap_or_default();
         let reflected = Radiant::new(stage, field.reflected(&mesh, &solution.irradiance));
         let direct = field.irradiance(&mesh);
-        Ok(Apart {
-            reflected,
-            solution,
-            reflectance,
-            direct,
-            entries,
-            bytes,
-            counts,
-            seconds,
-            row_sums,
-            clusters,
-            mesh,
-        })
+        Ok(Apart { reflected, solution, reflectance, direct, counts, stored, clusters, mesh })
     }
 
     /// The surface that points look at.
     pub fn stage<'a>(&'a self, occluders: &'a Occluders) -> Stage<'a> {
         Stage { mesh: &self.mesh, clusters: &self.clusters, occluders }
+    }
+
+    /// Indirect irradiance at the nodes of a finer mesh, gathered: one step of iterated collocation.
+    fn swept(&self, finer: Stage, allowed: f64, monitor: &Monitor) -> Result<Vec<DVec3>> {
+        let nodes = finer.mesh.basis.nodes();
+        let stage = self.stage(finer.occluders);
+        let each: Vec<Vec<DVec3>> = (0..self.mesh.elements())
+            .into_par_iter()
+            .map_init(Walker::default, |walker, element| {
+                monitor.check()?;
+                let root = self.mesh.element_root[element] as usize;
+                let (own, below) = (&self.mesh.roots[root], &finer.mesh.roots[root]);
+                let frame = &self.mesh.face_of(element).frame;
+                let corners = self.mesh.element_corners[element].map(|x| frame.lift(x));
+                let beam =
+                    Beam::new(&self.reflected, stage, &Patch::new(corners, frame.n), allowed);
+                let many = 1 << (2 * (below.level - own.level));
+                let first = below.first as usize + (element - own.first as usize) * many;
+                let gather = |node| {
+                    let (point, normal) = finer.mesh.node(node);
+                    beam.gather(&self.reflected, walker, stage, point, normal, allowed)
+                };
+                Ok((first * nodes..(first + many) * nodes).map(gather).collect())
+            })
+            .collect::<Result<_>>()?;
+        Ok(each.concat())
+    }
+
+    /// The mesh with one level more on the roots that hold nearly all of the squared difference in
+    /// indirect irradiance between this solution and a coarser one.
+    pub(super) fn refined_where_it_differs(&self, coarser: &Apart) -> Result<Mesh> {
+        let before = prolonged(&self.mesh, &coarser.mesh, &coarser.solution.irradiance);
+        let mut squares = vec![0.0; self.mesh.roots.len()];
+        for (node, (w, before)) in self.solution.irradiance.iter().zip(&before).enumerate() {
+            let element = node / self.mesh.basis.nodes();
+            let root = self.mesh.element_root[element] as usize;
+            squares[root] += self.mesh.area(element) * (*w - *before).length_squared();
+        }
+        let total: f64 = squares.iter().sum();
+        let mut order: Vec<usize> = (0..squares.len()).collect();
+        order.sort_by(|&a, &b| squares[a].total_cmp(&squares[b]).then(a.cmp(&b)));
+        let mut levels: Vec<u32> = self.mesh.roots.iter().map(|r| r.level + 1).collect();
+        let mut left = 0.0;
+        for root in order {
+            left += squares[root];
+            if left > LEFT * total {
+                break;
+            }
+            levels[root] -= 1;
+        }
+        self.mesh.with_levels(&levels)
     }
 
     /// Makes it the light of a scene: emitted and reflected light together again at the nodes.
@@ -128,11 +194,11 @@ impl Apart {
             exitance,
             solution,
             forecast: None,
-            entries: self.entries,
-            bytes: self.bytes,
+            entries: self.stored.entries,
+            bytes: self.stored.bytes,
             counts: self.counts,
-            seconds: self.seconds,
-            row_sums: self.row_sums,
+            seconds: self.stored.seconds,
+            row_sums: self.stored.row_sums,
         }
     }
 }
