@@ -79,6 +79,11 @@ fn render(settings: &RenderSettings) -> Result<()> {
     session.gathered(&light, &gathered);
     let mut metadata = settings.metadata();
     metadata.push(("view".into(), view.camera.name.clone()));
+    if let Some(source) = light.apart() {
+        let error = source.estimate.rms.hypot(gathered.error(source.estimate.mean));
+        metadata.push(("estimated error".into(), format!("{error:.2e}")));
+        metadata.extend(source.shortfall.iter().map(|why| ("shortfall".into(), why.clone())));
+    }
     let aspect = f64::from(view.width) / f64::from(view.height);
     let picture = Picture {
         width: view.width,
@@ -98,7 +103,8 @@ fn render(settings: &RenderSettings) -> Result<()> {
     }
     progress.clear();
     session.finish()?;
-    met(&light)
+    let filled = light.apart().map_or(0.0, |source| gathered.error(source.estimate.mean));
+    met(&light, filled)
 }
 
 fn probe(settings: &ProbeSettings) -> Result<()> {
@@ -130,7 +136,7 @@ fn probe(settings: &ProbeSettings) -> Result<()> {
         None => console::print(&csv::format_results(&points, &results))?,
     }
     session.finish()?;
-    met(&light)
+    met(&light, 0.0)
 }
 
 /// What watches over the making of the output: when time ran out, the best result is still written.
@@ -139,19 +145,24 @@ fn for_output<'a>(
     light: &Light,
     tell: &'a (dyn Fn(&'static str, u64, u64) + Sync),
 ) -> Monitor<'a> {
-    let late = light.apart().is_some_and(|source| source.shortfall.is_some());
+    let late = light.apart().is_some_and(|source| source.out_of_time);
     if late { Monitor::new(interrupt::flag(), None, tell) } else { monitor }
 }
 
-/// Whether the light is as good as was asked for.
-fn met(light: &Light) -> Result<()> {
+/// Whether the light is as good as was asked for, with errors of `filled` from filling in.
+fn met(light: &Light, filled: f64) -> Result<()> {
     let Some(source) = light.apart() else { return Ok(()) };
-    let Some(why) = &source.shortfall else { return Ok(()) };
+    let error = source.estimate.rms.hypot(filled);
+    let why = match &source.shortfall {
+        Some(why) => why.as_str(),
+        None if error > source.tolerance => "of what was filled in, or the range of its channels",
+        None => return Ok(()),
+    };
     Err(Error::ToleranceNotMet(format!(
         "the tolerance of {} was not met: {why}. What was written has an estimated error of {} (root \
          mean square, relative to the mean irradiance)",
         percent(source.tolerance),
-        percent(source.estimate.rms)
+        percent(error)
     )))
 }
 

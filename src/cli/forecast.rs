@@ -4,8 +4,9 @@ use lumel::Result;
 use lumel::cluster::Clusters;
 use lumel::mesh;
 use lumel::operator::clustered::{self, Kept};
-use lumel::operator::{Operator, OperatorKind, Stage};
+use lumel::operator::{FastOptions, Operator, OperatorKind, Stage};
 use lumel::scene::Scene;
+use lumel::solve::within::COARSEST;
 use lumel::visibility::Occluders;
 use serde::Serialize;
 
@@ -30,14 +31,19 @@ pub struct Forecast {
 impl Forecast {
     /// Builds the mesh and forecasts the operator.
     pub fn new(scene: &Scene, settings: &SolveSettings) -> Result<Forecast> {
-        let mesh = mesh::build(scene, &settings.light_options().mesh)?;
+        // To a tolerance the coarsest mesh is what must fit; finer ones follow while they do.
+        let (options, operator) = match settings.tolerance {
+            Some(_) => (COARSEST, OperatorKind::Fast(FastOptions::new(1e-2, None, None)?)),
+            None => (settings.light_options().mesh, settings.operator),
+        };
+        let mesh = mesh::build(scene, &options)?;
         let triangles: Vec<_> = scene.triangles.iter().map(|t| t.vertices).collect();
         let occluders = Occluders::build(&triangles);
         let clusters = Clusters::build(&mesh);
         let stage = Stage { mesh: &mesh, clusters: &clusters, occluders: &occluders };
         let fits = |bytes| settings.max_memory.is_none_or(|allowed| bytes <= allowed);
-        let mut operator_bytes = Operator::forecast(stage, settings.operator);
-        if let OperatorKind::Clustered(options) = settings.operator
+        let mut operator_bytes = Operator::forecast(stage, operator);
+        if let OperatorKind::Clustered(options) = operator
             && !fits(operator_bytes)
         {
             operator_bytes = clustered::forecast(stage, options.eta).bytes(Kept::Exact);

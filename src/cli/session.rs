@@ -147,6 +147,9 @@ impl Session {
             let filled = counts.error(source.estimate.mean);
             report.value("estimated error of filling in", filled);
             report.value("estimated error of the output rms", source.estimate.rms.hypot(filled));
+            let largest = counts.largest_error(source.estimate.mean);
+            report
+                .value("estimated error of the output maximum", source.estimate.maximum + largest);
         }
     }
 

@@ -9,6 +9,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::fit::{Fit, join, mismatch};
+use crate::error::Result;
 use crate::mesh::{Mesh, child};
 
 /// No children.
@@ -44,15 +45,15 @@ impl AdaptiveTree {
     /// Grows trees: of each cell, `refine` says what its four children carry, or nothing where it
     /// stays a leaf. Returns the tree and what each cell carries (roots: `of_root`).
     ///
-    /// None where there would be more than `most` cells. `state` makes memory for a thread. A cell's children depend on nothing but the cell, so that the
+    /// None where there would be more than `most` cells; errors are those of `refine`. `state` makes memory for a thread. A cell's children depend on nothing but the cell, so that the
     /// result is the same on any number of threads.
     pub fn grow<T: Copy + Send + Sync, S>(
         mesh: &Mesh,
         most: usize,
         of_root: T,
         state: impl Fn() -> S + Sync,
-        refine: impl Fn(&mut S, &Place, &T) -> Option<[T; 4]> + Sync,
-    ) -> Option<(AdaptiveTree, Vec<T>)> {
+        refine: impl Fn(&mut S, &Place, &T) -> Result<Option<[T; 4]>> + Sync,
+    ) -> Result<Option<(AdaptiveTree, Vec<T>)>> {
         let roots = mesh.roots.len();
         let mut tree = AdaptiveTree { children: vec![LEAF; roots], roots };
         let mut carried = vec![of_root; roots];
@@ -63,14 +64,21 @@ impl AdaptiveTree {
             .map(|(i, r)| Place { cell: i as u32, root: i as u32, depth: 0, corners: r.corners })
             .collect();
         while !front.is_empty() {
+            if tree.len() + 4 * front.len() > most {
+                return Ok(None);
+            }
             let found: Vec<Option<[T; 4]>> = front
                 .par_iter()
                 .with_min_len(16)
                 .map_init(&state, |state, place| {
                     let deep = place.depth >= DEEPEST_CELL;
-                    if deep { None } else { refine(state, place, &carried[place.cell as usize]) }
+                    if deep {
+                        Ok(None)
+                    } else {
+                        refine(state, place, &carried[place.cell as usize])
+                    }
                 })
-                .collect();
+                .collect::<Result<_>>()?;
             let mut next = vec![];
             for (place, four) in front.iter().zip(found) {
                 let Some(four) = four else { continue };
@@ -85,12 +93,9 @@ impl AdaptiveTree {
                     corners: child(&place.corners, k as usize),
                 }));
             }
-            if tree.len() > most {
-                return None;
-            }
             front = next;
         }
-        Some((tree, carried))
+        Ok(Some((tree, carried)))
     }
 
     /// The first of a cell's four children.

@@ -192,8 +192,9 @@ impl Beam {
         let cosines = (over_source / nearest).min(1.0) * (over_patch / nearest).min(1.0);
         let factor = source.area * cosines / (PI * nearest * nearest);
         let clear = source.between.0 == source.between.1;
-        let curved = if clear { (source.radius / from_centre).powi(2).min(1.0) } else { 1.0 };
-        radiant.field.deviation[source.number as usize] * factor.min(1.0) * curved <= allowed
+        let above = space.iter().all(|&x| patch.height(x) >= 0.0);
+        let curved = if clear && above { (source.radius / from_centre).powi(2) } else { 1.0 };
+        radiant.field.deviation[source.number as usize] * factor * curved.min(1.0) <= allowed
     }
 
     /// Finds runs of sources of one face, and lists the occluders of each run once.
@@ -218,6 +219,11 @@ impl Beam {
             self.groups.push(Group { sources, candidates: (first, self.candidates.len()), places });
             begin += same;
         }
+    }
+
+    /// Whether every point of the patch sees all of the sources that are above its horizon.
+    pub fn is_clear(&self) -> bool {
+        self.sources.iter().all(|source| source.between.0 == source.between.1)
     }
 
     /// As [`Radiant::gather`], for a point of the patch and its normal.

@@ -132,8 +132,10 @@ impl Radiant {
         } else {
             f64::INFINITY
         };
-        let curved = if clear { (cell.radius * cell.radius / square).min(1.0) } else { 1.0 };
-        let error = self.field.deviation[cell.number as usize] * factor.min(1.0) * curved;
+        // Where the horizon crosses it G has a kink.
+        let smooth = clear && scope.horizon.nowhere_negative(corners);
+        let curved = if smooth { (cell.radius * cell.radius / square).min(1.0) } else { 1.0 };
+        let error = self.field.deviation[cell.number as usize] * factor * curved;
         let mut sum = DVec3::ZERO;
         let below = (error > allowed).then(|| self.field.tree.children(cell.number)).flatten();
         if let Some(first) = below {

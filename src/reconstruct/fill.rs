@@ -21,6 +21,10 @@ const FEW: usize = 9;
 /// Most points of a task of its own.
 const TASK: usize = 1024;
 
+/// Most times that a root is cut for tasks, and then a task: points may coincide.
+const DEEPEST_TASK: u32 = 20;
+const DEEPEST: u32 = 20;
+
 /// Nodes lie this share of a root's size inside it: on its rim other faces may touch it, from where
 /// they would be seen edge on.
 const INSIDE: f64 = 1e-5;
@@ -43,6 +47,8 @@ pub struct FillCounts {
     pub gathered: u64,
     /// Sum of the squares of the errors that the filled in points are expected to have, (W/m^2)^2.
     pub squares: DVec3,
+    /// The most that an accepted check was off by, W/m^2: no filled in point is expected to be worse.
+    pub largest: f64,
 }
 
 /// Error of what is filled in, over what its check was off by (both root mean squares): an eighth for
@@ -54,13 +60,15 @@ const OF_CHECK: f64 = 0.3;
 /// no difference above `allowed` in any channel. With `allowed` 0 every point is gathered.
 ///
 /// `open` (root, triangle in its face's plane, what was made for a triangle around it) makes what
-/// points of a triangle share; `gather` (that, root, point) gathers.
+/// points of a triangle share; `gather` (that, root, point) gathers. `most` says how many points of a
+/// triangle may be filled in at once: few where something small might lie between the nodes.
 pub fn fill<B>(
     mesh: &Mesh,
     asked: &[RootPoints],
     allowed: f64,
     open: impl Fn(u32, &[DVec2; 3], Option<&B>) -> B + Sync,
     gather: impl Fn(&mut Walker, &B, u32, DVec2) -> DVec3 + Sync,
+    most: impl Fn(&B) -> usize + Sync,
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
     let mut tasks: Vec<Task> = vec![];
@@ -70,7 +78,7 @@ pub fn fill<B>(
         let corners = corners.map(|x| x + INSIDE * (centre - x));
         let points: Vec<Asked> =
             own.points.iter().enumerate().map(|(k, &x)| Asked { x, place: k as u32 }).collect();
-        cut(Task { place, root: own.root, corners, points }, &mut tasks);
+        cut(Task { place, root: own.root, corners, points }, DEEPEST_TASK, &mut tasks);
     }
     let stage = monitor.stage("gather", tasks.len() as u64);
     let done: Vec<Done> = tasks
@@ -87,11 +95,12 @@ pub fn fill<B>(
                     monitor.check()?;
                     Ok(gather(walker, shared, task.root, x))
                 },
+                most: &most,
                 allowed,
                 done: Done::default(),
             };
             let shared = (filler.open)(&task.corners, None);
-            filler.triangle(&task.corners, &shared, None, &mut task.points)?;
+            filler.triangle(&task.corners, &shared, None, DEEPEST, &mut task.points)?;
             stage.advance(1)?;
             Ok(filler.done)
         })
@@ -103,6 +112,7 @@ pub fn fill<B>(
         counts.points += own.values.len() as u64;
         counts.gathered += own.gathered;
         counts.squares += own.squares;
+        counts.largest = counts.largest.max(own.largest);
         for (k, value) in own.values {
             values[task.place][k as usize] = value;
         }
@@ -116,8 +126,9 @@ struct Done {
     /// Places and values of its points.
     values: Vec<(u32, DVec3)>,
     gathered: u64,
-    /// See [`FillCounts::squares`].
+    /// See [`FillCounts`].
     squares: DVec3,
+    largest: f64,
 }
 
 /// A point and where its value goes.
@@ -135,12 +146,12 @@ struct Task {
     points: Vec<Asked>,
 }
 
-/// Cuts a task until none has too many points.
-fn cut(task: Task, tasks: &mut Vec<Task>) {
+/// Cuts a task until none has too many points, at most `levels` times: points may coincide.
+fn cut(task: Task, levels: u32, tasks: &mut Vec<Task>) {
     if task.points.is_empty() {
         return;
     }
-    if task.points.len() <= TASK {
+    if task.points.len() <= TASK || levels == 0 {
         tasks.push(task);
         return;
     }
@@ -149,7 +160,7 @@ fn cut(task: Task, tasks: &mut Vec<Task>) {
         parts[part_of(&task.corners, point.x)].push(point);
     }
     for (k, points) in parts.into_iter().enumerate() {
-        cut(Task { corners: child(&task.corners, k), points, ..task }, tasks);
+        cut(Task { corners: child(&task.corners, k), points, ..task }, levels - 1, tasks);
     }
 }
 
@@ -162,9 +173,10 @@ fn part_of(corners: &[DVec2; 3], x: DVec2) -> usize {
 /// Corners, then the midpoints of the sides opposite to them.
 type Six = [DVec3; 6];
 
-struct Filler<O, G> {
+struct Filler<O, G, M> {
     open: O,
     gather: G,
+    most: M,
     allowed: f64,
     done: Done,
 }
@@ -172,7 +184,7 @@ struct Filler<O, G> {
 /// Points that are worth a beam of their own.
 const WORTH_OPENING: usize = 6;
 
-impl<O, G> Filler<O, G> {
+impl<O, G, M> Filler<O, G, M> {
     fn value<B>(&mut self, shared: &B, x: DVec2) -> Result<DVec3>
     where
         G: FnMut(&B, DVec2) -> Result<DVec3>,
@@ -197,14 +209,16 @@ impl<O, G> Filler<O, G> {
         corners: &[DVec2; 3],
         shared: &B,
         six: Option<Six>,
+        levels: u32,
         points: &mut [Asked],
     ) -> Result<()>
     where
+        M: Fn(&B) -> usize,
         O: FnMut(&[DVec2; 3], Option<&B>) -> B,
         G: FnMut(&B, DVec2) -> Result<DVec3>,
     {
         let cost = if six.is_some() { FEW } else { FEW + 6 };
-        if points.len() <= cost || self.allowed == 0.0 {
+        if points.len() <= cost || self.allowed == 0.0 || levels == 0 {
             return self.each(shared, points);
         }
         let [a, b, c] = *corners;
@@ -231,7 +245,9 @@ impl<O, G> Filler<O, G> {
             squares += off * off / NINE.len() as f64;
         }
         let four = children(&six, &nine);
-        if worst <= self.allowed {
+        let right = worst <= self.allowed;
+        if right && points.len() <= (self.most)(shared) {
+            self.done.largest = self.done.largest.max(worst);
             self.done.squares += points.len() as f64 * OF_CHECK * OF_CHECK * squares;
             for point in points.iter() {
                 let k = part_of(corners, point.x);
@@ -242,8 +258,8 @@ impl<O, G> Filler<O, G> {
         }
         // Where a line crosses that nothing smoothes, halving the triangle halves what lies beside it:
         // after the levels that smooth light would need, are there points left to win?
-        let levels = (worst / self.allowed).log2() / 3.0;
-        if points.len() as f64 <= FEW as f64 * levels.exp2() {
+        let needed = (worst / self.allowed).log2() / 3.0;
+        if !right && points.len() as f64 <= FEW as f64 * needed.exp2() {
             return self.each(shared, points);
         }
         points.sort_by_key(|p| part_of(corners, p.x));
@@ -253,9 +269,9 @@ impl<O, G> Filler<O, G> {
             let (own, part) = (&mut points[begin..begin + count], child(corners, k));
             if count >= WORTH_OPENING {
                 let narrowed = (self.open)(&part, Some(shared));
-                self.triangle(&part, &narrowed, Some(*six), own)?;
+                self.triangle(&part, &narrowed, Some(*six), levels - 1, own)?;
             } else {
-                self.triangle(&part, shared, Some(*six), own)?;
+                self.triangle(&part, shared, Some(*six), levels - 1, own)?;
             }
             begin += count;
         }
@@ -318,8 +334,9 @@ mod tests {
         let all = points.clone();
         let gather = |_: &(), x| Ok(f(x));
         let open = |_: &[DVec2; 3], _: Option<&()>| ();
-        let mut filler = Filler { open, gather, allowed, done: Done::default() };
-        filler.triangle(&T, &(), None, &mut points).unwrap();
+        let most = |_: &()| usize::MAX;
+        let mut filler = Filler { open, gather, most, allowed, done: Done::default() };
+        filler.triangle(&T, &(), None, DEEPEST, &mut points).unwrap();
         assert_eq!(filler.done.values.len(), all.len());
         let off = |(place, value): &(u32, DVec3)| {
             (*value - f(all[*place as usize].x)).abs().max_element()

@@ -15,6 +15,10 @@ use crate::solve::Light;
 /// with strong contrasts 0.3.
 const CHECKED: f64 = 2.0;
 
+/// Where something stands between an emitter and some of the points, at most so many of them are
+/// filled in at once: the shadow of something thin could lie between the nodes.
+const SHADED: usize = 32;
+
 /// What was done for direct and for indirect light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IrradianceCounts {
@@ -31,6 +35,7 @@ impl std::ops::AddAssign for IrradianceCounts {
             own.points += more.points;
             own.gathered += more.gathered;
             own.squares += more.squares;
+            own.largest = own.largest.max(more.largest);
         }
     }
 }
@@ -43,6 +48,12 @@ impl IrradianceCounts {
             / self.direct.points.max(self.indirect.points).max(1) as f64;
         let relative = DVec3::select(mean.cmpgt(DVec3::ZERO), squares / (mean * mean), squares);
         relative.max_element().sqrt()
+    }
+
+    /// The largest error that filling in is expected to have made, relative likewise.
+    pub fn largest_error(&self, mean: DVec3) -> f64 {
+        let least = mean.to_array().into_iter().filter(|&m| m > 0.0).fold(f64::INFINITY, f64::min);
+        (self.direct.largest + self.indirect.largest) / least
     }
 }
 
@@ -69,14 +80,17 @@ pub fn irradiances(
                 let (point, normal) = place(root, x);
                 light.irradiance(walker, point, normal)
             },
+            |()| usize::MAX,
             monitor,
         )?;
         return Ok((values, IrradianceCounts { direct, ..IrradianceCounts::default() }));
     };
     let checked = CHECKED * source.tolerance * source.estimate.mean.max_element();
-    let from = |radiant, allowed| from_radiant(light, radiant, (allowed, checked), asked, monitor);
-    let (mut values, direct) = from(&source.emitters, source.allowed_direct)?;
-    let (reflected, indirect) = from(&source.reflected, source.allowed)?;
+    let from = |radiant, allowed, at_once| {
+        from_radiant(light, radiant, (allowed, checked, at_once), asked, monitor)
+    };
+    let (mut values, direct) = from(&source.emitters, source.allowed_direct, SHADED)?;
+    let (reflected, indirect) = from(&source.reflected, source.allowed, usize::MAX)?;
     for (sum, more) in values.iter_mut().flatten().zip(reflected.into_iter().flatten()) {
         *sum += more;
     }
@@ -91,7 +105,8 @@ pub fn changes(light: &Light, asked: &[RootPoints], monitor: &Monitor) -> Result
     let Some(coarser) = &source.coarser else { return Ok(zero()) };
     let checked = CHECKED * source.tolerance * source.estimate.mean.max_element();
     let from = |radiant| {
-        from_radiant(light, radiant, (source.allowed, checked), asked, monitor).map(|(v, _)| v)
+        let how = (source.allowed, checked, usize::MAX);
+        from_radiant(light, radiant, how, asked, monitor).map(|(v, _)| v)
     };
     let (mut values, before) = (from(&source.reflected)?, from(coarser)?);
     for (value, before) in values.iter_mut().flatten().zip(before.into_iter().flatten()) {
@@ -103,7 +118,7 @@ pub fn changes(light: &Light, asked: &[RootPoints], monitor: &Monitor) -> Result
 fn from_radiant(
     light: &Light,
     radiant: &Radiant,
-    (allowed, checked): (f64, f64),
+    (allowed, checked, shaded): (f64, f64, usize),
     asked: &[RootPoints],
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
@@ -125,6 +140,7 @@ fn from_radiant(
             let frame = frame(root);
             beam.gather(radiant, walker, stage, frame.lift(x), frame.n, allowed)
         },
+        |beam| if beam.is_clear() { usize::MAX } else { shaded },
         monitor,
     )
 }

@@ -89,7 +89,7 @@ pub fn render(
 }
 
 /// The estimated error of the irradiance at each pixel, relative to its mean over the surface, for
-/// light that was made to a tolerance; 0 for other light.
+/// light that was made to a tolerance: infinite where there was but one mesh, or for other light.
 pub fn error_map(
     scene: &Scene,
     light: &Light,
@@ -99,10 +99,12 @@ pub fn error_map(
 ) -> Result<Vec<[f32; 3]>> {
     let surface = Surface::new(scene, &light.mesh);
     let painter = Painter::new(scene, light, camera, options, &surface);
-    let estimate = light.apart().map(|source| source.estimate);
-    let scale = estimate.map_or(DVec3::ZERO, |e| {
-        DVec3::select(e.mean.cmpgt(DVec3::ZERO), e.of_change / e.mean, DVec3::ZERO)
-    });
+    let known = light.apart().filter(|source| source.coarser.is_some());
+    let Some(estimate) = known.map(|source| source.estimate) else {
+        return Ok(vec![[f32::INFINITY; 3]; options.width as usize * options.height as usize]);
+    };
+    let mean = estimate.mean;
+    let scale = DVec3::select(mean.cmpgt(DVec3::ZERO), estimate.of_change / mean, DVec3::ZERO);
     painter.gathered(
         options,
         |asked| changes(light, asked, monitor),

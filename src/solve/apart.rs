@@ -75,8 +75,7 @@ impl Apart {
     ) -> Result<Apart> {
         let clusters = Clusters::build(&mesh);
         let stage = Stage { mesh: &mesh, clusters: &clusters, occluders };
-        let field = DirectField::new(scene, stage, emitters, &options.fineness)?;
-        monitor.check()?;
+        let field = DirectField::new(scene, stage, emitters, &options.fineness, monitor)?;
         let (reflectance, _) = mesh::appearance(scene, &mesh);
         let coarse =
             coarser.map(|c| Coarse { mesh: &c.mesh, clusters: &c.clusters, solution: &c.solution });

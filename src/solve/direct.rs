@@ -20,6 +20,7 @@ use crate::cluster::adaptive::{AdaptiveTree, Field};
 use crate::cluster::fit::{Fit, join, mismatch, split};
 use crate::error::{Error, Result};
 use crate::mesh::{Basis, Face, Mesh, child};
+use crate::monitor::Monitor;
 use crate::operator::gather::Radiant;
 use crate::operator::walk::{Stage, Walker};
 use crate::scene::{self, Scene};
@@ -73,7 +74,13 @@ fn footprints(face: &Face, corners: &[DVec2; 3]) -> [[DVec3; 3]; 3] {
 ///
 /// A cell is refined while its deviation from linear, rms over the whole surface with zero elsewhere,
 /// is above `fineness` (W/m^2).
-pub fn emission(scene: &Scene, stage: Stage, fineness: f64, max_memory: u64) -> Result<Radiant> {
+pub fn emission(
+    scene: &Scene,
+    stage: Stage,
+    fineness: f64,
+    max_memory: u64,
+    monitor: &Monitor,
+) -> Result<Radiant> {
     let mesh = stage.mesh;
     let area = surface_area(mesh);
     let grown = AdaptiveTree::grow(
@@ -86,17 +93,18 @@ pub fn emission(scene: &Scene, stage: Stage, fineness: f64, max_memory: u64) -> 
             let material =
                 &scene.materials[scene.triangles[face.triangle as usize].material as usize];
             if settled || material.radiance == DVec3::ZERO || material.radiance_texture.is_none() {
-                return None;
+                return Ok(None);
             }
+            monitor.check()?;
             let four = [0, 1, 2, 3].map(|k| {
                 footprints(face, &child(&place.corners, k))
                     .map(|f| scene::exitance(scene, face.triangle as usize, &f).to_array())
             });
             let settled = small(&join(&four), &four, &place.corners, area, fineness);
-            Some(four.map(|fit| (fit, settled)))
+            Ok(Some(four.map(|fit| (fit, settled))))
         },
     );
-    let (tree, carried) = grown.ok_or_else(|| too_fine("emitted", max_memory))?;
+    let (tree, carried) = grown?.ok_or_else(|| too_fine("emitted", max_memory))?;
     let mut values: Vec<Fit<3>> = carried.into_iter().map(|(fit, _)| fit).collect();
     tree.for_leaves(mesh, |place| {
         if place.depth == 0 {
@@ -150,6 +158,7 @@ impl DirectField {
         stage: Stage,
         emitters: &Radiant,
         fineness: &Fineness,
+        monitor: &Monitor,
     ) -> Result<DirectField> {
         let mesh = stage.mesh;
         let area = surface_area(mesh);
@@ -163,11 +172,12 @@ impl DirectField {
             |walker, place, cell: &DirectCell| {
                 let root = &mesh.roots[place.root as usize];
                 if cell.settled || dark {
-                    return None;
+                    return Ok(None);
                 }
                 if place.depth < root.level {
-                    return Some([DARK; 4]);
+                    return Ok(Some([DARK; 4]));
                 }
+                monitor.check()?;
                 let face = &mesh.faces[root.face as usize];
                 let triangle = face.triangle as usize;
                 let four = [0, 1, 2, 3].map(|k| {
@@ -193,11 +203,11 @@ impl DirectField {
                 });
                 let settled =
                     small(&join(&products), &products, &place.corners, area, fineness.deviation);
-                Some(four.map(|cell| DirectCell { settled, ..cell }))
+                Ok(Some(four.map(|cell| DirectCell { settled, ..cell })))
             },
         );
         let (tree, cells) =
-            grown.ok_or_else(|| too_fine("directly reflected", fineness.max_memory))?;
+            grown?.ok_or_else(|| too_fine("directly reflected", fineness.max_memory))?;
         Ok(DirectField { tree, cells })
     }
 

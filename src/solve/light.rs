@@ -90,6 +90,8 @@ pub struct ApartSource {
     pub tolerance: f64,
     /// Why that was not reached, where it was not.
     pub shortfall: Option<String>,
+    /// Whether refining was ended by the time limit.
+    pub out_of_time: bool,
 }
 
 /// Meshes a scene, builds the operator and solves for its light.

@@ -27,8 +27,15 @@ use crate::operator::{FastOptions, Operator, OperatorKind};
 use crate::scene::Scene;
 use crate::visibility::Occluders;
 
-/// Elements of the coarsest mesh, unless there are more roots.
-const COARSEST: usize = 120;
+/// The coarsest mesh, unless there are more roots.
+pub const COARSEST: MeshOptions =
+    MeshOptions { basis: Basis::Linear, refinement: Refinement::Elements(120) };
+
+/// The largest error of all points over that of the samples.
+const BETWEEN: f64 = 2.0;
+
+/// Where something emits and no light has been found to arrive on meshes as fine as this, none does.
+const DARK_FOR_GOOD: u32 = 5;
 
 /// Parts of a solution are made as good as this share of the error that it is expected to have at
 /// most, and the first ones to this tolerance.
@@ -113,14 +120,18 @@ pub struct Estimate {
 }
 
 /// Error of the finer of two solutions over their difference, when steps divide errors by
-/// `reduction` (not a number before that has been seen): 1/(reduction - 1), with a margin.
+/// `reduction`: 1/(reduction - 1), with a margin. Not a number before that has been seen: then the
+/// coarser one was from the coarsest mesh, and worse than it has to be.
 fn of_change(reduction: f64) -> f64 {
     const MARGIN: f64 = 1.3;
-    /// Never less, however fast errors seem to fall; never more, since steps with four times the
-    /// elements do divide them.
-    const BELIEVED: (f64, f64) = (0.5, 1.5);
-    let reduction = if reduction.is_nan() { f64::INFINITY } else { reduction.max(1.0) };
-    (MARGIN / (reduction - 1.0)).clamp(BELIEVED.0, BELIEVED.1)
+    const FIRST: f64 = 0.5;
+    /// Never less, however fast errors seem to fall: along rims they fall slowly, and are last to go.
+    /// Never more, since steps with four times the elements do divide them.
+    const BELIEVED: (f64, f64) = (0.7, 3.0);
+    if reduction.is_nan() {
+        return FIRST;
+    }
+    (MARGIN / (reduction.max(1.0) - 1.0)).clamp(BELIEVED.0, BELIEVED.1)
 }
 
 /// The best so far.
@@ -144,6 +155,8 @@ struct Ladder<'a> {
     options: &'a WithinOptions,
     base: &'a Mesh,
     emitters: &'a Radiant,
+    /// Emitted power over area, W/m^2.
+    emission: DVec3,
     samples: Vec<Sample>,
     /// Direct irradiance at the samples.
     direct: Vec<DVec3>,
@@ -158,15 +171,14 @@ struct Ladder<'a> {
 pub fn light_within(scene: &Scene, options: &WithinOptions, monitor: &Monitor) -> Result<Light> {
     let triangles: Vec<[DVec3; 3]> = scene.triangles.iter().map(|t| t.vertices).collect();
     let occluders = Occluders::build(&triangles);
-    let coarsest = MeshOptions { basis: Basis::Linear, refinement: Refinement::Elements(COARSEST) };
-    let base = mesh::build(scene, &coarsest)?;
+    let base = mesh::build(scene, &COARSEST)?;
     let clusters = Clusters::build(&base);
     let stage = Stage { mesh: &base, clusters: &clusters, occluders: &occluders };
     refuse_too_large(stage, options)?;
-    let whole = emission(scene, stage, f64::INFINITY, options.max_memory)?;
+    let whole = emission(scene, stage, f64::INFINITY, options.max_memory, monitor)?;
     let mean = mean_emission(&base, &whole);
     let unit = options.tolerance * mean.max_element();
-    let emitters = emission(scene, stage, share::DIRECT * unit, options.max_memory)?;
+    let emitters = emission(scene, stage, share::DIRECT * unit, options.max_memory, monitor)?;
     let samples = samples(&base);
     let direct = gathered(stage, &emitters, &samples, share::EMITTER * unit, monitor)?;
     let ladder = Ladder {
@@ -175,12 +187,14 @@ pub fn light_within(scene: &Scene, options: &WithinOptions, monitor: &Monitor) -
         options,
         base: &base,
         emitters: &emitters,
+        emission: mean,
         samples,
         direct,
         monitor,
     };
-    let (reached, why) = ladder.climb(mean)?;
-    let met = why.is_none() && reached.estimate.rms <= options.tolerance;
+    let (reached, why) = ladder.climb()?;
+    let met = reached.tolerance <= options.tolerance && reached.estimate.rms <= options.tolerance;
+    let out_of_time = matches!(why, Some(Error::TimeLimit(_)));
     let source = |reflected| {
         Source::Apart(Box::new(ApartSource {
             emitters,
@@ -191,6 +205,7 @@ pub fn light_within(scene: &Scene, options: &WithinOptions, monitor: &Monitor) -
             estimate: reached.estimate,
             tolerance: options.tolerance,
             shortfall: if met { None } else { Some(why_not(why)) },
+            out_of_time,
         }))
     };
     Ok(reached.apart.into_light(scene, occluders, source))
@@ -198,14 +213,14 @@ pub fn light_within(scene: &Scene, options: &WithinOptions, monitor: &Monitor) -
 
 impl Ladder<'_> {
     /// Refines until the tolerance is met, or until something else ends it.
-    fn climb(&self, mean: DVec3) -> Result<(Reached, Option<Error>)> {
-        let mut reached = self.step(0, mean, None)?;
+    fn climb(&self) -> Result<(Reached, Option<Error>)> {
+        let mut reached = self.step(0, None)?;
         for step in 1..MOST_STEPS {
             if self.is_good_enough(&reached, 1.0) {
                 break;
             }
             let start = Instant::now();
-            match self.step(step, reached.estimate.mean, Some(&reached)) {
+            match self.step(step, Some(&reached)) {
                 Ok(next) => {
                     let coarser = std::mem::replace(&mut reached, next);
                     reached.coarser = Some(coarser.apart);
@@ -233,7 +248,8 @@ impl Ladder<'_> {
     }
 
     /// One mesh more, finer than that of `before`.
-    fn step(&self, step: u32, mean: DVec3, before: Option<&Reached>) -> Result<Reached> {
+    fn step(&self, step: u32, before: Option<&Reached>) -> Result<Reached> {
+        let mean = self.brightness(before);
         // The first meshes are far off: what is much better than they are would be wasted on them.
         let expected = before.map_or(f64::INFINITY, |b| b.estimate.rms);
         let tolerance = self.options.tolerance.max((WORTH * expected).min(COARSEST_TOLERANCE));
@@ -291,10 +307,15 @@ impl Ladder<'_> {
     ) -> Result<Reached> {
         let samples = &self.samples;
         let stage = apart.stage(self.occluders);
-        let unit = tolerance * before.map_or(self.direct_mean(), |b| b.estimate.mean).max_element();
+        let unit = tolerance * self.brightness(before).max_element();
         let found = gathered(stage, &apart.reflected, samples, share::GATHER * unit, self.monitor)?;
         let total = found.iter().zip(&self.direct).map(|(w, d)| *w + *d);
         let mean: DVec3 = total.zip(samples).map(|(h, s)| s.weight * h).sum();
+        if !mean.is_finite() {
+            return Err(Error::Runtime(
+                "the irradiance is not finite: the emission is too large (--light-scale)".into(),
+            ));
+        }
         let allowed = share::GATHER * tolerance * mean.max_element();
         let off_by = |a: &[DVec3], b: &[DVec3]| -> Vec<DVec3> {
             a.iter().zip(b).map(|(a, b)| relative((*a - *b).abs(), mean)).collect()
@@ -320,21 +341,28 @@ impl Ladder<'_> {
             _ => f64::NAN,
         };
         let of_change = of_change(reduction);
-        let dark = mean == DVec3::ZERO;
-        let estimate = Estimate {
-            rms: if dark { 0.0 } else { (of_change * change).hypot(rms(&gathering, &some)) },
-            maximum: if dark { 0.0 } else { largest(&local) + largest(&gathering) },
-            mean,
-            of_change,
-            steps: step + 1,
+        // A spot of light may lie between all nodes of the first meshes.
+        let dark_for_good = self.emission == DVec3::ZERO || step >= DARK_FOR_GOOD;
+        let (error, most) = match mean == DVec3::ZERO {
+            true if dark_for_good => (0.0, 0.0),
+            true => (f64::INFINITY, f64::INFINITY),
+            false => (
+                (of_change * change).hypot(rms(&gathering, &some)),
+                BETWEEN * (largest(&local) + largest(&gathering)),
+            ),
         };
+        let estimate = Estimate { rms: error, maximum: most, mean, of_change, steps: step + 1 };
         let coarser = None;
         Ok(Reached { apart, coarser, at_samples: found, changes, estimate, tolerance, allowed })
     }
 
-    /// Mean direct irradiance over the surface.
-    fn direct_mean(&self) -> DVec3 {
-        self.direct.iter().zip(&self.samples).map(|(h, s)| s.weight * *h).sum()
+    /// The mean irradiance as far as it is known, W/m^2.
+    fn brightness(&self, reached: Option<&Reached>) -> DVec3 {
+        let mean = match reached {
+            Some(reached) => reached.estimate.mean,
+            None => self.direct.iter().zip(&self.samples).map(|(h, s)| s.weight * *h).sum(),
+        };
+        if mean == DVec3::ZERO { self.emission } else { mean }
     }
 }
 
@@ -353,6 +381,7 @@ fn why_not(why: Option<Error>) -> String {
                 mebibytes(allowed)
             )
         }
+        Some(Error::Usage(_)) => "there would be too many elements".into(),
         Some(why) => why.to_string(),
         None => "elements cannot be made smaller".into(),
     }
