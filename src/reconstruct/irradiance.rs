@@ -13,7 +13,7 @@ use crate::solve::Light;
 /// times the mean irradiance. What is filled in is about eight times better: the root mean square
 /// measured over the shipped scenes was 0.1 to 0.2 units, over rooms
 /// with strong contrasts 0.3.
-const CHECKED: f64 = 2.0;
+const CHECKED: f64 = 3.0;
 
 /// Where something stands between an emitter and some of the points, at most so many of them are
 /// filled in at once: the shadow of something thin could lie between the nodes.

@@ -60,7 +60,7 @@ const GROWTH: f64 = 4.0;
 /// units: gathering 0.05, direct light 0.02, operator 0.01, residual 0.01.
 mod share {
     /// A cell's error in gathering.
-    pub const GATHER: f64 = 0.3;
+    pub const GATHER: f64 = 0.5;
     /// Deviation of directly reflected light from linear, see [`super::Fineness`].
     pub const DIRECT: f64 = 0.3;
     /// A cell of an emitter.
