@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::gather::{Cell, Radiant};
+use super::runs::Runs;
 use super::walk::{Scope, Stage, Walker};
 use crate::kernel::View;
 use crate::mesh::child;
@@ -51,25 +52,13 @@ struct Source {
     between: (u32, u32),
 }
 
-/// Sources of one face.
-#[derive(Clone, Copy, Debug)]
-struct Group {
-    sources: (usize, usize),
-    /// A range of [`Beam::candidates`], and where its sources' places begin.
-    candidates: (usize, usize),
-    places: usize,
-}
-
 /// All that radiates towards a patch.
 #[derive(Clone, Debug, Default)]
 pub struct Beam {
     /// Face by face.
     sources: Vec<Source>,
     occluders: Vec<u32>,
-    groups: Vec<Group>,
-    /// Occluders of each group, each once; for each source in turn its own as places there.
-    candidates: Vec<u32>,
-    places: Vec<u32>,
+    runs: Runs,
 }
 
 impl Beam {
@@ -197,28 +186,8 @@ impl Beam {
         radiant.field.deviation[source.number as usize] * factor * curved.min(1.0) <= allowed
     }
 
-    /// Finds runs of sources of one face, and lists the occluders of each run once.
     fn group(&mut self) {
-        let mut begin = 0;
-        while begin < self.sources.len() {
-            let face = self.sources[begin].face;
-            let same = self.sources[begin..].iter().take_while(|s| s.face == face).count();
-            let (first, places) = (self.candidates.len(), self.places.len());
-            for source in &self.sources[begin..begin + same] {
-                let (from, to) = source.between;
-                for &i in &self.occluders[from as usize..to as usize] {
-                    let known = self.candidates[first..].iter().position(|&c| c == i);
-                    let place = known.unwrap_or_else(|| {
-                        self.candidates.push(i);
-                        self.candidates.len() - 1 - first
-                    });
-                    self.places.push(place as u32);
-                }
-            }
-            let sources = (begin, begin + same);
-            self.groups.push(Group { sources, candidates: (first, self.candidates.len()), places });
-            begin += same;
-        }
+        self.runs.find(&self.sources, 0, &self.occluders, |s| (s.face, s.between));
     }
 
     /// Whether every point of the patch sees all of the sources that are above its horizon.
@@ -241,7 +210,7 @@ impl Beam {
         let mut clip = std::mem::take(&mut walker.clip);
         let mut numbers = std::mem::take(&mut walker.numbers);
         let mut sum = DVec3::ZERO;
-        for group in &self.groups {
+        for group in &self.runs.list {
             let sources = &self.sources[group.sources.0..group.sources.1];
             let index = sources[0].face;
             let face = &mesh.faces[index as usize];
@@ -253,7 +222,7 @@ impl Beam {
             numbers.clear();
             let (first, end) = group.candidates;
             if first < end {
-                let list = &self.candidates[first..end];
+                let list = &self.runs.candidates[first..end];
                 walker.shadows.cast(&observer, &face.frame, &face.corners, list, &mut numbers);
             }
             let scope = Scope { face, index, view, horizon };
@@ -262,7 +231,7 @@ impl Beam {
                 let places = place..place + (source.between.1 - source.between.0) as usize;
                 place = places.end;
                 walker.active.clear();
-                let shadows = self.places[places].iter().map(|&p| numbers[p as usize]);
+                let shadows = self.runs.places[places].iter().map(|&p| numbers[p as usize]);
                 walker.active.extend(shadows.filter(|&number| number != Shadows::NONE));
                 let cell = Cell {
                     number: source.number,

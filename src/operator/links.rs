@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::pairs::{Cell, Pending, Source};
+use super::runs::{Run, Runs};
 use super::walk::Stage;
 use crate::geometry::{Frame, Pieces};
 use crate::kernel::{Moments, Precision, View};
@@ -36,23 +37,10 @@ pub struct Linker {
     precision: Precision,
     shadows: Shadows,
     active: Vec<u32>,
-    /// Occluders of one face after the other, and the shadow of each (or none).
-    candidates: Vec<u32>,
+    /// Shadows of the candidates of a run (or none).
     numbers: Vec<u32>,
-    /// For each source in turn its occluders, as places in the list of its face.
-    places: Vec<u32>,
-    groups: Vec<Group>,
+    runs: Runs,
     clip: Pieces,
-}
-
-/// Sources of one face.
-#[derive(Clone, Copy)]
-struct Group {
-    /// Their range in the list of sources.
-    sources: (usize, usize),
-    /// The range of their occluders among the candidates, and the first place.
-    candidates: (usize, usize),
-    places: usize,
 }
 
 impl Linker {
@@ -62,10 +50,8 @@ impl Linker {
             precision,
             shadows: Shadows::default(),
             active: vec![],
-            candidates: vec![],
             numbers: vec![],
-            places: vec![],
-            groups: vec![],
+            runs: Runs::default(),
             clip: Pieces::default(),
         }
     }
@@ -80,13 +66,14 @@ impl Linker {
         rows: &mut Rows,
     ) {
         let Stage { mesh, occluders, .. } = stage;
-        self.group(pending, from);
+        let of = |s: &Source| (s.cell.face, s.between);
+        self.runs.find(&pending.sources, from, &pending.occluders, of);
         let first = element.first_element(stage) as usize * mesh.basis.nodes();
         for node in first..first + mesh.basis.nodes() {
             let (point, normal) = mesh.node(node);
             let observer = Observer { occluders, point, normal };
-            for g in 0..self.groups.len() {
-                let group = self.groups[g];
+            for g in 0..self.runs.list.len() {
+                let group = self.runs.list[g];
                 let (first, end) = group.sources;
                 self.face(&observer, stage, &pending.sources[first..end], &group, rows);
             }
@@ -122,40 +109,13 @@ impl Linker {
         }
     }
 
-    /// Finds runs of sources of one face, and lists the occluders of each run once.
-    fn group(&mut self, pending: &Pending, from: usize) {
-        self.groups.clear();
-        self.candidates.clear();
-        self.places.clear();
-        let mut begin = from;
-        while begin < pending.sources.len() {
-            let face = pending.sources[begin].cell.face;
-            let same = pending.sources[begin..].iter().take_while(|s| s.cell.face == face).count();
-            let (first, places) = (self.candidates.len(), self.places.len());
-            for source in &pending.sources[begin..begin + same] {
-                let (from, to) = source.between;
-                for &i in &pending.occluders[from as usize..to as usize] {
-                    let known = self.candidates[first..].iter().position(|&c| c == i);
-                    let place = known.unwrap_or_else(|| {
-                        self.candidates.push(i);
-                        self.candidates.len() - 1 - first
-                    });
-                    self.places.push(place as u32);
-                }
-            }
-            let sources = (begin, begin + same);
-            self.groups.push(Group { sources, candidates: (first, self.candidates.len()), places });
-            begin += same;
-        }
-    }
-
     /// Links one node to clusters of one face.
     fn face(
         &mut self,
         observer: &Observer,
         stage: Stage,
         sources: &[Source],
-        group: &Group,
+        group: &Run,
         rows: &mut Rows,
     ) {
         let face = &stage.mesh.faces[sources[0].cell.face as usize];
@@ -168,7 +128,7 @@ impl Linker {
         self.numbers.clear();
         let (first, end) = group.candidates;
         if first < end {
-            let list = &self.candidates[first..end];
+            let list = &self.runs.candidates[first..end];
             self.shadows.cast(observer, &face.frame, &face.corners, list, &mut self.numbers);
         }
         let mut place = group.places;
@@ -180,7 +140,7 @@ impl Linker {
                 continue;
             }
             self.active.clear();
-            let shadows = self.places[places].iter().map(|&p| self.numbers[p as usize]);
+            let shadows = self.runs.places[places].iter().map(|&p| self.numbers[p as usize]);
             self.active.extend(shadows.filter(|&number| number != Shadows::NONE));
             let to = self.active.len();
             let coverage = match to {

@@ -11,6 +11,7 @@ pub mod gather;
 pub mod links;
 pub mod pairs;
 pub mod reach;
+pub mod runs;
 pub mod walk;
 
 use crate::cluster::fit::Deviation;

@@ -1,8 +1,8 @@
 //! Light to a tolerance: meshes are refined until the estimated error is small enough.
 //!
-//! Each mesh of the ladder has four times the elements of the one before. Irradiance is gathered at points spread
-//! over the surface, from each solution: what changes from one to the next, and how fast that
-//! falls, tells how far the last one is from the limit. Everything else (the operator, the
+//! Each mesh of the ladder has four times the elements of the one before. Irradiance is gathered
+//! at points spread over the surface, from each solution: what changes from one to the next, and
+//! how fast that falls, tells how far the last one is from the limit. Everything else (the operator, the
 //! representation of direct light, fits, integrals, the iteration) is kept to shares of the
 //! tolerance that were measured to be harmless; what gathering is off by is measured at the same
 //! points.
