@@ -268,7 +268,7 @@ fn a_closed_furnace_is_as_bright_as_it_must_be() {
 #[test]
 fn what_cannot_be_met_is_said_and_the_best_is_given() {
     let room = furnished(5);
-    let options = WithinOptions::new(1e-4, 80 << 20);
+    let options = WithinOptions::new(1e-4, 160 << 20);
     let light = light_within(&room, &options, &Monitor::silent()).unwrap();
     let source = light.apart().unwrap();
     let why = source.shortfall.as_ref().unwrap();

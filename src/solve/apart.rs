@@ -119,6 +119,16 @@ impl Apart {
         Stage { mesh: &self.mesh, clusters: &self.clusters, occluders }
     }
 
+    /// About how much the reflected radiosity varies over a root, W/m^2: the range of its linear fit,
+    /// and three times its rms deviation from that.
+    pub fn variation(&self, root: usize) -> f64 {
+        let field = &self.reflected.field;
+        // The interior nodes at 1/6 span half of the triangle.
+        let [a, b, c] = field.fits[root].map(DVec3::from_array);
+        let range = 2.0 * (a.max(b).max(c) - a.min(b).min(c));
+        range.max_element() + 3.0 * field.deviation[root]
+    }
+
     /// Indirect irradiance at the nodes of a finer mesh, gathered: one step of iterated collocation.
     fn swept(&self, finer: Stage, allowed: f64, monitor: &Monitor) -> Result<Vec<DVec3>> {
         let nodes = finer.mesh.basis.nodes();

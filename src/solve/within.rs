@@ -48,6 +48,11 @@ const SWEEP_GAINS: f64 = 3.0;
 /// Of every so many points one is gathered again to see what gathering is off by.
 const GATHERED_AGAIN: usize = 4;
 
+/// Roots are refined from the first mesh to the second, however small they are, if what they reflect
+/// varies by more than this many units of the tolerance times the mean irradiance: what is the same in
+/// both says nothing about its error.
+const VARIED: f64 = 5.0;
+
 /// Most steps of the ladder: elements 2^-12 of the coarsest.
 const MOST_STEPS: u32 = 13;
 
@@ -62,7 +67,7 @@ mod share {
     /// A cell's error in gathering.
     pub const GATHER: f64 = 0.5;
     /// Deviation of directly reflected light from linear, see [`super::Fineness`].
-    pub const DIRECT: f64 = 0.3;
+    pub const DIRECT: f64 = 0.2;
     /// A cell of an emitter.
     pub const EMITTER: f64 = 0.02;
     /// The operator, relative to the largest irradiance.
@@ -124,7 +129,7 @@ pub struct Estimate {
 /// coarser one was from the coarsest mesh, and worse than it has to be.
 fn of_change(reduction: f64) -> f64 {
     const MARGIN: f64 = 1.3;
-    const FIRST: f64 = 0.5;
+    const FIRST: f64 = 0.54;
     /// Never less, however fast errors seem to fall: along rims they fall slowly, and are last to go.
     /// Never more, since steps with four times the elements do divide them.
     const BELIEVED: (f64, f64) = (0.7, 3.0);
@@ -281,8 +286,7 @@ impl Ladder<'_> {
             {
                 apart.refined_where_it_differs(coarser)?
             }
-            // One level more everywhere would be just as many.
-            _ => self.base.refined_to(Refinement::Elements(self.base.elements() << (2 * step)))?,
+            _ => self.even_mesh(step, before)?,
         };
         let coarser = before.map(|b| &b.apart);
         let apart = Apart::new(
@@ -295,6 +299,22 @@ impl Ladder<'_> {
             self.monitor,
         )?;
         self.look(step, apart, before, tolerance)
+    }
+
+    /// The mesh of a step: elements as even as can be, but for roots whose light varies.
+    fn even_mesh(&self, step: u32, before: Option<&Reached>) -> Result<Mesh> {
+        // One level more everywhere would be just as many.
+        let even = Refinement::Elements(self.base.elements() << (2 * step));
+        let mesh = self.base.refined_to(even)?;
+        let Some(before) = before else { return Ok(mesh) };
+        let unit = self.options.tolerance * self.brightness(Some(before)).max_element();
+        let levels: Vec<u32> = (0..mesh.roots.len())
+            .map(|root| {
+                let varies = before.apart.variation(root) > VARIED * unit;
+                mesh.roots[root].level.max(self.base.roots[root].level + u32::from(varies))
+            })
+            .collect();
+        mesh.with_levels(&levels)
     }
 
     /// Gathers at the samples and estimates the error.
