@@ -17,9 +17,9 @@ use super::Bounds;
 
 /// A hierarchy over a list of boxes.
 pub struct BoxTree {
-    tree: Bvh2,
-    centre: DVec3,
-    scale: f64,
+    pub(super) tree: Bvh2,
+    pub(super) centre: DVec3,
+    pub(super) scale: f64,
 }
 
 struct Proposed(Aabb);

@@ -8,12 +8,14 @@ pub mod convex;
 pub mod frame;
 pub mod polygon;
 pub mod ray;
+pub mod ray_tree;
 
 pub use bounds::Bounds;
 pub use box_tree::BoxTree;
 pub use contact::{CONTACT, contact_distance, file_rounding};
 pub use frame::Frame;
 pub use polygon::{Linear, Pieces};
+pub use ray_tree::{RayHit, RayTree};
 
 /// Half a unit in the last place of 1: the relative error of one rounded f64 operation.
 pub const ROUNDING: f64 = f64::EPSILON / 2.0;

@@ -4,12 +4,16 @@
 //! (2.10) is diag(rho/pi) A. Everything here is colour-blind: geometry, never reflectance.
 
 pub mod beam;
+pub mod bundles;
 pub mod clustered;
 pub mod exact;
 pub mod fast;
 pub mod gather;
+pub mod hemisphere;
+pub mod lamps;
 pub mod links;
 pub mod pairs;
+pub mod patches;
 pub mod reach;
 pub mod runs;
 pub mod walk;

@@ -72,6 +72,8 @@ pub struct Walker {
     pub(super) numbers: Vec<u32>,
     facing: Vec<u32>,
     stack: Vec<u32>,
+    /// Boxes that a ray has yet to look into.
+    pub(super) boxes: Vec<(u32, f32)>,
     pub(super) clip: Pieces,
     /// What was met since this was last reset.
     pub counts: Counts,

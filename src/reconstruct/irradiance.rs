@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::operator::beam::{Beam, Patch};
 use crate::operator::gather::Radiant;
-use crate::solve::Light;
+use crate::solve::{ApartSource, Light, Reflected};
 
 /// Where light is filled in, what is checked may be off by this much, in units of the tolerance
 /// times the mean irradiance. What is filled in is about eight times better: the root mean square
@@ -86,11 +86,10 @@ pub fn irradiances(
         return Ok((values, IrradianceCounts { direct, ..IrradianceCounts::default() }));
     };
     let checked = CHECKED * source.tolerance * source.estimate.mean.max_element();
-    let from = |radiant, allowed, at_once| {
-        from_radiant(light, radiant, (allowed, checked, at_once), asked, monitor)
-    };
-    let (mut values, direct) = from(&source.emitters, source.allowed_direct, SHADED)?;
-    let (reflected, indirect) = from(&source.reflected, source.allowed, usize::MAX)?;
+    let how = (source.allowed_direct, checked, SHADED);
+    let (mut values, direct) = from_radiant(light, &source.emitters, how, asked, monitor)?;
+    let (reflected, indirect) =
+        from_reflected(light, source, &source.reflected, checked, asked, monitor)?;
     for (sum, more) in values.iter_mut().flatten().zip(reflected.into_iter().flatten()) {
         *sum += more;
     }
@@ -104,15 +103,44 @@ pub fn changes(light: &Light, asked: &[RootPoints], monitor: &Monitor) -> Result
     let Some(source) = light.apart() else { return Ok(zero()) };
     let Some(coarser) = &source.coarser else { return Ok(zero()) };
     let checked = CHECKED * source.tolerance * source.estimate.mean.max_element();
-    let from = |radiant| {
-        let how = (source.allowed, checked, usize::MAX);
-        from_radiant(light, radiant, how, asked, monitor).map(|(v, _)| v)
+    let from = |reflected| {
+        from_reflected(light, source, reflected, checked, asked, monitor).map(|(v, _)| v)
     };
     let (mut values, before) = (from(&source.reflected)?, from(coarser)?);
     for (value, before) in values.iter_mut().flatten().zip(before.into_iter().flatten()) {
         *value = (*value - before).abs();
     }
     Ok(values)
+}
+
+fn from_reflected(
+    light: &Light,
+    source: &ApartSource,
+    reflected: &Reflected,
+    checked: f64,
+    asked: &[RootPoints],
+    monitor: &Monitor,
+) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
+    match reflected {
+        Reflected::Cells(radiant) => {
+            let how = (source.allowed, checked, usize::MAX);
+            from_radiant(light, radiant, how, asked, monitor)
+        }
+        Reflected::Rays(_) => fill(
+            &light.mesh,
+            asked,
+            checked,
+            |_, _, _| (),
+            |walker, (), root, x| {
+                let face = light.mesh.roots[root as usize].face;
+                let frame = &light.mesh.faces[face as usize].frame;
+                let (point, stage) = (frame.lift(x), light.stage());
+                source.gather_reflected(reflected, walker, stage, point, frame.n)
+            },
+            |()| usize::MAX,
+            monitor,
+        ),
+    }
 }
 
 fn from_radiant(

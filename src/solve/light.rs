@@ -9,6 +9,7 @@ use crate::cluster::Clusters;
 use crate::error::{Error, Result};
 use crate::mesh::{self, Mesh, MeshOptions};
 use crate::monitor::Monitor;
+use crate::operator::bundles::{RayCounts, RayRadiant, RayScene};
 use crate::operator::clustered::ClusteredSource;
 use crate::operator::fast::FitSource;
 use crate::operator::gather::Radiant;
@@ -72,14 +73,24 @@ pub(super) enum Source {
     Apart(Box<ApartSource>),
 }
 
+/// Reflected light, ready for gathering.
+pub enum Reflected {
+    /// By cells, with exact visibility.
+    Cells(Radiant),
+    /// By bundles of rays.
+    Rays(RayRadiant),
+}
+
 /// A solution with direct light apart, made to a tolerance.
 pub struct ApartSource {
     /// What emits: E.
     pub emitters: Radiant,
     /// What is reflected: rho H.
-    pub reflected: Radiant,
+    pub reflected: Reflected,
     /// The same from the next coarser mesh, where there was one: what changed tells the error.
-    pub coarser: Option<Radiant>,
+    pub coarser: Option<Reflected>,
+    /// What rays meet and how many are cast, where reflected light is gathered by them.
+    pub rays: Option<(RayScene, RayCounts)>,
     /// Errors that a cell may make in gathering reflected light, W/m^2.
     pub allowed: f64,
     /// Those in gathering emitted light.
@@ -180,6 +191,29 @@ pub(super) fn row_sums(operator: &Operator, mesh: &Mesh, receives: &[bool]) -> (
         .fold((f64::MAX, f64::MIN), |(a, b), (_, &s)| (a.min(s), b.max(s)))
 }
 
+impl ApartSource {
+    /// Irradiance from `reflected` light (of this solution or the coarser one) at a point.
+    pub fn gather_reflected(
+        &self,
+        reflected: &Reflected,
+        walker: &mut Walker,
+        stage: Stage,
+        point: DVec3,
+        normal: DVec3,
+    ) -> DVec3 {
+        match (reflected, &self.rays) {
+            (Reflected::Cells(radiant), _) => {
+                radiant.gather(walker, stage, point, normal, self.allowed)
+            }
+            (Reflected::Rays(radiant), Some((rays, counts))) => {
+                let scene = (rays, stage.mesh);
+                radiant.gather(walker, scene, (point, normal), self.allowed, *counts).irradiance
+            }
+            (Reflected::Rays(_), None) => DVec3::ZERO,
+        }
+    }
+}
+
 impl Light {
     /// The surface that points look at.
     pub fn stage(&self) -> Stage<'_> {
@@ -204,7 +238,7 @@ impl Light {
                 let direct = &source.emitters;
                 let stage = self.stage();
                 direct.gather(walker, stage, point, normal, source.allowed_direct)
-                    + source.reflected.gather(walker, stage, point, normal, source.allowed)
+                    + source.gather_reflected(&source.reflected, walker, stage, point, normal)
             }
             Source::Exact => gather(walker, self.stage(), &self.solution.radiosity, point, normal),
         }

@@ -6,6 +6,7 @@ pub mod direct;
 mod gmres;
 pub mod levels;
 pub mod light;
+pub mod many;
 pub mod samples;
 pub mod within;
 
@@ -18,7 +19,7 @@ use crate::operator::Operator;
 
 pub use colours::Colours;
 pub use gmres::gmres;
-pub use light::{ApartSource, Light, LightOptions};
+pub use light::{ApartSource, Light, LightOptions, Reflected};
 pub use within::{Estimate, Way, WithinOptions, light_within};
 
 /// When to stop.

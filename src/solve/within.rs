@@ -15,7 +15,8 @@ use rayon::prelude::*;
 use super::SolveOptions;
 use super::apart::{Apart, ApartOptions};
 use super::direct::{Fineness, emission, surface_area};
-use super::light::{ApartSource, FORECAST_FROM, Light, Source};
+use super::light::{ApartSource, FORECAST_FROM, Light, Reflected, Source};
+use super::many::{is_many, light_of_many};
 use super::samples::{Sample, samples};
 use crate::cluster::Clusters;
 use crate::error::{Error, Result};
@@ -63,7 +64,7 @@ const GROWTH: f64 = 4.0;
 ///
 /// Measured on the Cornell box at 0.1 %, as root mean square errors of the irradiance in the same
 /// units: gathering 0.05, direct light 0.02, operator 0.01, residual 0.01.
-mod share {
+pub(super) mod share {
     /// A cell's error in gathering.
     pub const GATHER: f64 = 0.5;
     /// Deviation of directly reflected light from linear, see [`super::Fineness`].
@@ -127,7 +128,7 @@ pub struct Estimate {
 /// Error of the finer of two solutions over their difference, when steps divide errors by
 /// `reduction`: 1/(reduction - 1), with a margin. Not a number before that has been seen: then the
 /// coarser one was from the coarsest mesh, and worse than it has to be.
-fn of_change(reduction: f64) -> f64 {
+pub(super) fn of_change(reduction: f64) -> f64 {
     const MARGIN: f64 = 1.3;
     const FIRST: f64 = 0.54;
     /// Never less, however fast errors seem to fall: along rims they fall slowly, and are last to go.
@@ -177,6 +178,9 @@ pub fn light_within(scene: &Scene, options: &WithinOptions, monitor: &Monitor) -
     let triangles: Vec<[DVec3; 3]> = scene.triangles.iter().map(|t| t.vertices).collect();
     let occluders = Occluders::build(&triangles);
     let base = mesh::build(scene, &COARSEST)?;
+    if is_many(base.roots.len(), options.tolerance) {
+        return light_of_many(scene, base, occluders, options, monitor);
+    }
     let clusters = Clusters::build(&base);
     let stage = Stage { mesh: &base, clusters: &clusters, occluders: &occluders };
     refuse_too_large(stage, options)?;
@@ -203,8 +207,9 @@ pub fn light_within(scene: &Scene, options: &WithinOptions, monitor: &Monitor) -
     let source = |reflected| {
         Source::Apart(Box::new(ApartSource {
             emitters,
-            reflected,
-            coarser: reached.coarser.map(|c| c.reflected),
+            reflected: Reflected::Cells(reflected),
+            coarser: reached.coarser.map(|c| Reflected::Cells(c.reflected)),
+            rays: None,
             allowed: reached.allowed,
             allowed_direct: share::EMITTER / share::GATHER * reached.allowed,
             estimate: reached.estimate,
@@ -386,7 +391,7 @@ impl Ladder<'_> {
     }
 }
 
-fn why_not(why: Option<Error>) -> String {
+pub(super) fn why_not(why: Option<Error>) -> String {
     match why {
         Some(Error::TimeLimit(seconds)) => {
             format!("the time limit of {seconds} s would run out (--time-limit)")
@@ -424,23 +429,23 @@ fn refuse_too_large(stage: Stage, options: &WithinOptions) -> Result<()> {
     })
 }
 
-fn relative(off: DVec3, mean: DVec3) -> DVec3 {
+pub(super) fn relative(off: DVec3, mean: DVec3) -> DVec3 {
     DVec3::select(mean.cmpgt(DVec3::ZERO), off / mean, DVec3::ZERO)
 }
 
 /// Of the channels the largest root mean square.
-fn rms(off: &[DVec3], at: &[Sample]) -> f64 {
+pub(super) fn rms(off: &[DVec3], at: &[Sample]) -> f64 {
     let sum: DVec3 = off.iter().zip(at).map(|(x, s)| s.weight * *x * *x).sum();
     let weights: f64 = off.iter().zip(at).map(|(_, s)| s.weight).sum();
     if weights > 0.0 { (sum / weights).max_element().sqrt() } else { 0.0 }
 }
 
-fn largest(off: &[DVec3]) -> f64 {
+pub(super) fn largest(off: &[DVec3]) -> f64 {
     off.iter().map(|x| x.max_element()).fold(0.0, f64::max)
 }
 
 /// Emitted power over area: the mean irradiance of a closed black scene.
-fn mean_emission(mesh: &Mesh, emitters: &Radiant) -> DVec3 {
+pub(super) fn mean_emission(mesh: &Mesh, emitters: &Radiant) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for (root, fit) in mesh.roots.iter().zip(&emitters.field.fits) {
         let [a, b, c] = root.corners;
@@ -451,7 +456,7 @@ fn mean_emission(mesh: &Mesh, emitters: &Radiant) -> DVec3 {
     if area > 0.0 { sum / area } else { DVec3::ZERO }
 }
 
-fn gathered(
+pub(super) fn gathered(
     stage: Stage,
     radiant: &Radiant,
     samples: &[Sample],

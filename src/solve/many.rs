@@ -1,0 +1,371 @@
+//! Light of scenes of many small faces, to a tolerance.
+//!
+//! Emitted light is gathered exactly. What is reflected is the radiosity of patches
+//! ([`crate::operator::patches`]), and irradiance from it a mean over bundles of rays
+//! ([`crate::operator::bundles`]): each face of such a scene fills little of any hemisphere. The
+//! error has two parts: that of the bundles, known from their halves, and that of the patches, known
+//! from what changes when they are made smaller.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::direct::emission;
+use super::light::{ApartSource, Light, Reflected, Source};
+use super::samples::{Sample, samples};
+use super::within::{
+    Estimate, gathered, largest, mean_emission, of_change, relative, rms, share, why_not,
+};
+use super::{Solution, SolveOptions, WithinOptions, gmres};
+use crate::cluster::Clusters;
+use crate::error::{Error, Result};
+use crate::mesh::{self, Mesh};
+use crate::monitor::Monitor;
+use crate::operator::bundles::{Estimated, RayCounts, RayRadiant, RayScene, Rows};
+use crate::operator::lamps::{Lamps, Samples};
+use crate::operator::patches::{PatchSizes, Patches};
+use crate::operator::walk::{Stage, Walker};
+use crate::scene::Scene;
+use crate::visibility::Occluders;
+
+/// From so many roots on bundles of rays are better than exact visibility, at a tolerance of 1 %.
+const MANY_AT_ONE_PERCENT: f64 = 1500.0;
+
+/// How the time for a bundle grows with one over the tolerance: errors fall like n^(-3/4).
+const GROWTH: f64 = 4.0 / 3.0;
+
+/// Side of the first squares in units of the scene's size, and of cubes in that of squares.
+const FIRST_SQUARE: f64 = 1.0 / 14.0;
+const CUBE: f64 = 0.25;
+
+/// Smallest squares in units of the first.
+const SMALLEST: f64 = 1.0 / 64.0;
+
+/// Share of the squared differences within patches that is left unsplit.
+const LEFT: f64 = 0.25;
+
+/// At a tolerance of 1 %: rays from a spot into the hemisphere, and to what emits.
+const RAYS_OF_SPOT: f64 = 128.0;
+const POINTS_OF_LAMPS: f64 = 64.0;
+
+/// Rays that are cast first for a gathered point, and how many times as many at most.
+const FIRST_RAYS: f64 = 512.0;
+const MORE_RAYS: u32 = 32;
+
+/// Patches are split so many times by what a share of these rays tells, before errors are looked at.
+const PREPARED: u32 = 5;
+const COARSE: f64 = 0.25;
+
+/// Most steps of the ladder.
+const MOST_STEPS: u32 = 7;
+
+/// Whether bundles of rays are the better way for so many roots.
+pub fn is_many(roots: usize, tolerance: f64) -> bool {
+    roots as f64 > MANY_AT_ONE_PERCENT * (0.01 / tolerance).powf(GROWTH).max(1.0)
+}
+
+fn rays(at_one_percent: f64, tolerance: f64) -> u32 {
+    let wanted = at_one_percent * (0.01 / tolerance).powf(GROWTH);
+    (wanted.clamp(16.0, 65_536.0) as u32).next_power_of_two()
+}
+
+/// What was found with patches of one size.
+struct Step {
+    radiant: RayRadiant,
+    irradiance: Vec<DVec3>,
+    varies: Vec<bool>,
+    entries: usize,
+    bytes: usize,
+    iterations: usize,
+    residual: DVec3,
+}
+
+/// Solves for the light of a scene of many faces; `base` is its coarsest mesh.
+pub fn light_of_many(
+    scene: &Scene,
+    base: Mesh,
+    occluders: Occluders,
+    options: &WithinOptions,
+    monitor: &Monitor,
+) -> Result<Light> {
+    let clusters = Clusters::build(&base);
+    let stage = Stage { mesh: &base, clusters: &clusters, occluders: &occluders };
+    let max_memory = options.max_memory;
+    let whole = emission(scene, stage, f64::INFINITY, max_memory, monitor)?;
+    let emitted = mean_emission(&base, &whole);
+    let unit = options.tolerance * emitted.max_element();
+    let emitters = emission(scene, stage, share::DIRECT * unit, max_memory, monitor)?;
+    let at = samples(&base);
+    let direct = gathered(stage, &emitters, &at, share::EMITTER * unit, monitor)?;
+    let lamps = Lamps::new(scene, &base);
+    let rays_scene = RayScene::new(scene, &base);
+    let ladder = Ladder {
+        scene,
+        stage,
+        rays: &rays_scene,
+        lamps: &lamps,
+        samples: &at,
+        direct: &direct,
+        emitted,
+        options,
+        monitor,
+    };
+    let (reached, why) = ladder.climb()?;
+    let Reached { step, coarser, estimate, .. } = reached;
+    let met = estimate.rms <= options.tolerance;
+    let out_of_time = matches!(why, Some(Error::TimeLimit(_)));
+    let allowed = share::GATHER * options.tolerance * estimate.mean.max_element();
+    let (reflectance, exitance) = mesh::appearance(scene, &base);
+    let irradiance: Vec<DVec3> = (0..base.nodes())
+        .map(|node| {
+            let element = node / base.basis.nodes();
+            let face = base.roots[base.element_root[element] as usize].face;
+            let x = base.faces[face as usize].frame.project(base.node(node).0);
+            step.irradiance[step.radiant.patches.at(face, x)]
+        })
+        .collect();
+    let nodes = exitance.iter().zip(&reflectance).zip(&irradiance);
+    let radiosity = nodes.map(|((e, rho), h)| *e + *rho * *h).collect();
+    let solution = Solution {
+        radiosity,
+        irradiance,
+        residual: step.residual,
+        iterations: step.iterations,
+        channels: 3,
+    };
+    let counts = vec![("patches", step.radiant.patches.len() as u64)];
+    let source = ApartSource {
+        emitters,
+        reflected: Reflected::Rays(step.radiant),
+        coarser: coarser.map(Reflected::Rays),
+        rays: Some((rays_scene, ladder_counts(options.tolerance))),
+        allowed,
+        allowed_direct: share::EMITTER / share::GATHER * allowed,
+        estimate,
+        tolerance: options.tolerance,
+        shortfall: if met { None } else { Some(why_not(why)) },
+        out_of_time,
+    };
+    Ok(Light {
+        source: Source::Apart(Box::new(source)),
+        mesh: base,
+        clusters,
+        occluders,
+        reflectance,
+        exitance,
+        solution,
+        forecast: None,
+        entries: step.entries,
+        bytes: step.bytes,
+        counts,
+        seconds: vec![],
+        row_sums: (0.0, 1.0),
+    })
+}
+
+fn ladder_counts(tolerance: f64) -> RayCounts {
+    let least = rays(FIRST_RAYS, tolerance);
+    RayCounts { least, most: (least * MORE_RAYS).min(1 << 18) }
+}
+
+struct Ladder<'a> {
+    scene: &'a Scene,
+    stage: Stage<'a>,
+    rays: &'a RayScene,
+    lamps: &'a Lamps,
+    samples: &'a [Sample],
+    direct: &'a [DVec3],
+    emitted: DVec3,
+    options: &'a WithinOptions,
+    monitor: &'a Monitor<'a>,
+}
+
+/// The best so far.
+struct Reached {
+    step: Step,
+    coarser: Option<RayRadiant>,
+    at_samples: Vec<DVec3>,
+    changes: Vec<f64>,
+    estimate: Estimate,
+}
+
+impl Ladder<'_> {
+    /// Makes patches smaller until the tolerance is met, or until something else ends it.
+    fn climb(&self) -> Result<(Reached, Option<Error>)> {
+        let mut first = self.step(None, COARSE)?;
+        for _ in 1..PREPARED {
+            first = self.step(Some(&first), COARSE)?;
+        }
+        let mut reached = self.look(0, Some(&first), None)?;
+        for number in 1..MOST_STEPS {
+            match self.look(number, Some(&reached.step), Some(&reached)) {
+                Ok(next) => {
+                    let before = std::mem::replace(&mut reached, next);
+                    reached.coarser = Some(before.step.radiant);
+                }
+                Err(Error::Interrupted) => return Err(Error::Interrupted),
+                Err(why) => return Ok((reached, Some(why))),
+            }
+            if reached.estimate.rms <= share::SOLUTION * self.options.tolerance {
+                return Ok((reached, None));
+            }
+        }
+        Ok((reached, None))
+    }
+
+    /// Solves with patches of one size, looks at the samples and estimates the error.
+    fn look(
+        &self,
+        number: u32,
+        coarser: Option<&Step>,
+        before: Option<&Reached>,
+    ) -> Result<Reached> {
+        let step = self.step(coarser, 1.0)?;
+        let tolerance = self.options.tolerance;
+        let mean = match before {
+            Some(before) => before.estimate.mean,
+            None => self.emitted,
+        };
+        let allowed = share::GATHER * tolerance * mean.max_element();
+        let counts = ladder_counts(tolerance);
+        let mesh = self.stage.mesh;
+        let found: Vec<Estimated> = self
+            .samples
+            .par_iter()
+            .map_init(Walker::default, |walker, s| {
+                self.monitor.check()?;
+                let place = (s.point, s.normal);
+                Ok(step.radiant.gather(walker, (self.rays, mesh), place, allowed, counts))
+            })
+            .collect::<Result<_>>()?;
+        let at_samples: Vec<DVec3> = found.iter().map(|e| e.irradiance).collect();
+        let totals = at_samples.iter().zip(self.direct).zip(self.samples);
+        let mean: DVec3 = totals.map(|((w, d), s)| s.weight * (*w + *d)).sum();
+        if !mean.is_finite() {
+            return Err(Error::Runtime(
+                "the irradiance is not finite: the emission is too large (--light-scale)".into(),
+            ));
+        }
+        let spread: Vec<DVec3> = found.iter().map(|e| relative(e.spread, mean)).collect();
+        let mut changes = before.map_or(vec![], |b| b.changes.clone());
+        let local: Vec<DVec3> = match before {
+            Some(b) => at_samples
+                .iter()
+                .zip(&b.at_samples)
+                .map(|(a, b)| relative((*a - *b).abs(), mean))
+                .collect(),
+            None => vec![DVec3::INFINITY; at_samples.len()],
+        };
+        let change = rms(&local, self.samples);
+        if before.is_some() {
+            changes.push(change);
+        }
+        let reduction = match changes[..] {
+            [first, .., last] if first > 0.0 && last > 0.0 => {
+                (first / last).powf(1.0 / (changes.len() - 1) as f64)
+            }
+            _ => f64::NAN,
+        };
+        let of_change = of_change(reduction);
+        let (error, maximum) = match mean == DVec3::ZERO {
+            true => (0.0, 0.0),
+            false => (
+                (of_change * change).hypot(rms(&spread, self.samples)),
+                2.0 * (largest(&local) + largest(&spread)),
+            ),
+        };
+        let estimate = Estimate { rms: error, maximum, mean, of_change, steps: number + 1 };
+        Ok(Reached { step, coarser: None, at_samples, changes, estimate })
+    }
+
+    /// Solves on patches: the first ones, or those of the solution `before` split where its light
+    /// varies.
+    fn step(&self, before: Option<&Step>, share_of_rays: f64) -> Result<Step> {
+        let mesh = self.stage.mesh;
+        let tolerance = self.options.tolerance;
+        let square = FIRST_SQUARE * mesh.bounds.extent();
+        let patches = match before {
+            None => {
+                let sizes = PatchSizes { square, cube: CUBE * square };
+                Patches::build(self.scene, mesh, &sizes)?
+            }
+            Some(before) => {
+                let least = square * SMALLEST;
+                before.radiant.patches.split(self.scene, mesh, &before.varies, least)
+            }
+        };
+        let samples = Samples {
+            points: rays(share_of_rays * POINTS_OF_LAMPS, tolerance),
+            rays: rays(share_of_rays * RAYS_OF_SPOT, tolerance),
+        };
+        let max_memory = self.options.max_memory;
+        let lamps = (self.lamps, samples);
+        let rows = Rows::cast(self.rays, mesh, &patches, lamps, max_memory, self.monitor)?;
+        let mean_direct = rows.means(&patches, &rows.direct);
+        let begin: Vec<[f64; 3]> = times(&mean_direct, &patches.reflectance);
+        let apply = |u: &[[f64; 3]], out: &mut [[f64; 3]]| {
+            let own = rows.means(&patches, &rows.at_spots(u));
+            let reflected = own.iter().zip(&patches.reflectance);
+            out.par_iter_mut().zip(u).zip(reflected.collect::<Vec<_>>()).for_each(
+                |((out, u), (h, rho))| *out = std::array::from_fn(|c| u[c] - rho[c] * h[c]),
+            );
+        };
+        let residual = (share::RESIDUAL * tolerance).clamp(1e-13, 1e-3);
+        let how = SolveOptions { residual, ..SolveOptions::default() };
+        let (u, residual, iterations) = gmres(&apply, &begin, None, &how, self.monitor)?;
+        let mut at_spots = rows.at_spots(&u);
+        for (h, d) in at_spots.iter_mut().zip(&rows.direct) {
+            (0..3).for_each(|c| h[c] += d[c]);
+        }
+        let irradiance = rows.means(&patches, &at_spots);
+        let radiosity = times(&irradiance, &patches.reflectance);
+        let varies = self.varies(&patches, &rows, &at_spots, &radiosity);
+        let vectors = |x: Vec<[f64; 3]>| x.into_iter().map(DVec3::from_array).collect();
+        Ok(Step {
+            radiant: RayRadiant { radiosity: vectors(radiosity), patches },
+            irradiance: vectors(irradiance),
+            varies,
+            entries: rows.entries(),
+            bytes: rows.bytes(),
+            iterations,
+            residual: DVec3::from_array(residual),
+        })
+    }
+
+    /// Which patches radiate so unevenly that they are to be split: those with nearly all of the
+    /// squared differences between spots.
+    fn varies(
+        &self,
+        patches: &Patches,
+        rows: &Rows,
+        at_spots: &[[f64; 3]],
+        radiosity: &[[f64; 3]],
+    ) -> Vec<bool> {
+        let squares: Vec<f64> = (0..patches.len())
+            .map(|patch| {
+                let rho = patches.reflectance[patch];
+                let spots = patches.range(patch).filter(|&spot| !rows.is_buried(spot));
+                let off = spots.map(|spot| {
+                    let u = rho * DVec3::from_array(at_spots[spot]);
+                    (u - DVec3::from_array(radiosity[patch])).abs().max_element()
+                });
+                patches.area[patch] * off.fold(0.0, f64::max).powi(2)
+            })
+            .collect();
+        let total: f64 = squares.iter().sum();
+        let mut order: Vec<usize> = (0..squares.len()).collect();
+        order.sort_by(|&a, &b| squares[a].total_cmp(&squares[b]).then(a.cmp(&b)));
+        let mut left = 0.0;
+        let mut varies = vec![false; squares.len()];
+        for patch in order {
+            left += squares[patch];
+            varies[patch] = left > LEFT * total;
+        }
+        varies
+    }
+}
+
+/// Irradiance times reflectance.
+fn times(irradiance: &[[f64; 3]], reflectance: &[DVec3]) -> Vec<[f64; 3]> {
+    let product = |(h, rho): (&[f64; 3], &DVec3)| std::array::from_fn(|c| h[c] * rho[c]);
+    irradiance.iter().zip(reflectance).map(product).collect()
+}

@@ -1,0 +1,112 @@
+//! Scenes of many small faces: light from bundles of rays agrees with exact visibility.
+
+mod common;
+#[path = "common/random.rs"]
+mod random;
+#[path = "common/rooms.rs"]
+mod rooms;
+
+use glam::DVec3;
+use lumel::Monitor;
+use lumel::operator::Walker;
+use lumel::scene::{Scene, Triangle};
+use lumel::solve::many::is_many;
+use lumel::solve::{Light, Reflected, WithinOptions, light_within};
+use rooms::furnished;
+
+/// The same surface in 4^levels times the triangles.
+fn cut(scene: &Scene, levels: u32) -> Scene {
+    let mut fine = scene.clone();
+    for _ in 0..levels {
+        let four = |t: &Triangle| -> [Triangle; 4] {
+            let [a, b, c] = t.vertices;
+            let (ab, bc, ca) = (a.midpoint(b), b.midpoint(c), c.midpoint(a));
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
+                .map(|vertices| Triangle { vertices, ..t.clone() })
+        };
+        fine.triangles = fine.triangles.iter().flat_map(four).collect();
+    }
+    fine
+}
+
+fn within(scene: &Scene, tolerance: f64) -> Light {
+    light_within(scene, &WithinOptions::new(tolerance, u64::MAX), &Monitor::silent()).unwrap()
+}
+
+/// Irradiance at the centroids of some triangles, a little before them.
+fn at_triangles(light: &Light, scene: &Scene, step: usize) -> Vec<DVec3> {
+    let mut walker = Walker::default();
+    let at = |t: &Triangle| {
+        let [a, b, c] = t.vertices;
+        light.irradiance(&mut walker, (a + b + c) / 3.0, t.normal_and_area().0)
+    };
+    scene.triangles.iter().step_by(step).map(at).collect()
+}
+
+fn is_by_rays(light: &Light) -> bool {
+    matches!(light.apart().unwrap().reflected, Reflected::Rays(_))
+}
+
+#[test]
+fn rays_agree_with_exact_visibility() {
+    for seed in [0, 1] {
+        let room = furnished(seed);
+        let fine = cut(&room, 3);
+        let (exact, rays) = (within(&room, 1e-3), within(&fine, 1e-2));
+        assert!(!is_by_rays(&exact) && is_by_rays(&rays));
+        let (want, got) = (at_triangles(&exact, &fine, 13), at_triangles(&rays, &fine, 13));
+        let mean = rays.apart().unwrap().estimate.mean;
+        // By area: small things have as many triangles as walls.
+        let weights: Vec<f64> =
+            fine.triangles.iter().step_by(13).map(|t| t.normal_and_area().1).collect();
+        let total: f64 = weights.iter().sum();
+        let squares: DVec3 = (0..want.len())
+            .map(|i| weights[i] / total * ((got[i] - want[i]) / mean).powf(2.0))
+            .sum();
+        let (error, estimate) = (squares.max_element().sqrt(), rays.apart().unwrap().estimate.rms);
+        println!("room {seed}: {} points, error {error:.2e}, estimate {estimate:.2e}", want.len());
+        // Both are sums over few points.
+        assert!(error <= 1e-2 && 1.5 * estimate >= error, "{error:e} {estimate:e}");
+    }
+}
+
+#[test]
+fn a_closed_furnace_is_as_bright_as_it_must_be() {
+    let mut room = cut(&furnished(4), 3);
+    for m in &mut room.materials {
+        (m.reflectance, m.radiance) =
+            (DVec3::splat(0.5), DVec3::splat(std::f64::consts::FRAC_1_PI));
+    }
+    let light = within(&room, 1e-2);
+    assert!(is_by_rays(&light));
+    // u = E / (1 - rho) = 2 everywhere that is not buried.
+    let off: Vec<f64> = at_triangles(&light, &room, 17)
+        .into_iter()
+        .map(|h| (h - 2.0).abs().max_element())
+        .filter(|off| *off < 1.0)
+        .collect();
+    let square = off.iter().map(|x| x * x).sum::<f64>() / off.len() as f64;
+    println!("{} points, off by {:.2e}", off.len(), square.sqrt());
+    assert!(square.sqrt() < 2e-2);
+}
+
+#[test]
+fn the_same_bits_on_any_number_of_threads() {
+    let room = cut(&furnished(1), 3);
+    let bits = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let light = within(&room, 3e-2);
+            assert!(is_by_rays(&light));
+            at_triangles(&light, &room, 101)
+        })
+    };
+    let one = bits(1);
+    assert!(one == bits(2) && one == bits(3));
+}
+
+#[test]
+fn few_faces_and_small_tolerances_are_left_to_exact_visibility() {
+    assert!(!is_many(300, 1e-2) && !is_many(5000, 1e-3));
+    assert!(is_many(60_000, 1e-2) && is_many(60_000, 3e-3));
+}
