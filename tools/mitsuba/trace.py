@@ -12,10 +12,7 @@ Everything else is unbiased: emitters are sampled at every vertex, and weighed a
 hit them (balance heuristic); paths end by Russian roulette alone.
 """
 
-import drjit as dr
-import numpy as np
-
-from scene import mi
+from scene import dr, mi, np
 
 # Distance of rays from surfaces, relative to the scene's size.
 NEAR = 2e-6
@@ -135,14 +132,29 @@ def irradiance(scene, extent, positions, normals, samples, seed, near=NEAR):
     return means(value, len(positions), samples, seed)
 
 
-def radiance(scene, extent, rays, samples, seed, near=NEAR):
-    """Radiance, W/(m^2 sr), and its standard error along rays (a wide mi.Ray3f)."""
+def picture(value, rays, across, samples, seed):
+    """Means over across x across rays a pixel of `value(ray, sampler)`, and standard errors: arrays
+    (pixels, 3); samples taken of each ray."""
 
-    def value(index, sampler):
+    def one(index, sampler):
         ray = mi.Ray3f(dr.gather(mi.Point3f, rays.o, index), dr.gather(mi.Vector3f, rays.d, index))
-        return seen(scene, near * extent, ray, sampler)
+        return value(ray, sampler)
 
-    return means(value, dr.width(rays.d), samples, seed)
+    mean, error, done = means(one, dr.width(rays.d), samples, seed)
+    mean = mean.reshape(-1, across**2, 3).mean(axis=1)
+    error = np.sqrt((error.reshape(-1, across**2, 3) ** 2).sum(axis=1)) / across**2
+    return mean, error, done
+
+
+def radiance(scene, extent, rays, across, samples, seed, near=NEAR):
+    """Radiance, W/(m^2 sr), of the pixels of a picture, as [`picture`] has it."""
+    return picture(lambda ray, sampler: seen(scene, near * extent, ray, sampler),
+                   rays, across, samples, seed)
+
+
+def stock_path():
+    """Mitsuba's own path tracer: paths of any length, ended by Russian roulette alone."""
+    return mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": CERTAIN + 1})
 
 
 def stock_irradiance(scene, positions, normals, reflectance, emitted, samples, seed, above=1e-4):
@@ -150,7 +162,7 @@ def stock_irradiance(scene, positions, normals, reflectance, emitted, samples, s
 
     A ray meets each point from `above` metres over it; what comes back is Le + rho / pi H.
     """
-    integrator = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": CERTAIN + 1})
+    integrator = stock_path()
     p, n = (mi.Point3f(np.ascontiguousarray(v.T, dtype=np.float32)) for v in (positions, normals))
 
     def value(index, sampler):
