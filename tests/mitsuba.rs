@@ -4,7 +4,8 @@
 //! A value may be off by four standard errors of the path tracer and by the error that lumel itself
 //! reports there: the one of its error map, which tells where, and the root mean square over the
 //! surface. Squares of what it is off by, in units of both, must have a mean of at most one, but for
-//! four standard deviations of such a mean: an error that all places share would show there first.
+//! four standard deviations of such a mean; and the sums must agree within four standard errors of
+//! theirs and the root mean square, so that an error that all places share shows.
 //!
 //! The path tracer works in float32: its rays start a little above surfaces and end a little
 //! before what they are to reach, which brightens penumbrae. How much is in the files, and checked
@@ -107,15 +108,26 @@ fn pairs_of_points(scene: &Scene, light: &Light, data: &Value) -> Vec<Pair> {
 
 fn pairs_of_view(scene: &Scene, light: &Light, data: &Value) -> Vec<Pair> {
     let view = &data["view"];
-    let number = |name: &str| view[name].as_u64().unwrap() as u32;
-    let (width, height) = (number("width"), number("height"));
+    let number = |name: &str| view[name].as_u64().unwrap() as usize;
+    let (width, height, across) = (number("width"), number("height"), number("across"));
     let camera = &scene.cameras[0];
     assert_eq!(camera.name, view["camera"].as_str().unwrap());
-    let options = RenderOptions { width, height, samples: number("across"), gather: true };
+    // The rays of the file are those through the middles of finer pixels; light is gathered for each.
+    let fine = (across * width) as u32;
+    let options =
+        RenderOptions { width: fine, height: (across * height) as u32, samples: 1, gather: true };
     let monitor = Monitor::silent();
     let (pixels, counts) = render(scene, light, camera, &options, &monitor).unwrap();
     let map = error_map(scene, light, camera, &options, &monitor).unwrap();
-    let vector = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from));
+    let blocks = |pixels: &[[f32; 3]]| -> Vec<DVec3> {
+        let mut sums = vec![DVec3::ZERO; width * height];
+        for (k, pixel) in pixels.iter().enumerate() {
+            let (x, y) = (k % (across * width) / across, k / (across * width) / across);
+            sums[y * width + x] += DVec3::from_array(pixel.map(f64::from));
+        }
+        sums.into_iter().map(|sum| sum / (across * across) as f64).collect()
+    };
+    let (pixels, map) = (blocks(&pixels), blocks(&map));
     let estimate = light.apart().unwrap().estimate;
     // Radiance is rho H / pi with rho below 1.
     let unit = estimate.mean / std::f64::consts::PI;
@@ -125,11 +137,11 @@ fn pairs_of_view(scene: &Scene, light: &Light, data: &Value) -> Vec<Pair> {
     let ours = pixels.iter().zip(&map).enumerate();
     ours.zip(traced)
         .map(|((k, (pixel, map)), (theirs, error))| Pair {
-            name: format!("pixel {}, {}", k % width as usize, k / width as usize),
-            ours: vector(pixel),
+            name: format!("pixel {}, {}", k % width, k / width),
+            ours: *pixel,
             theirs,
             error,
-            here: vector(map) * unit,
+            here: *map * unit,
             overall,
         })
         .collect()
@@ -156,14 +168,20 @@ fn compare(what: &str, pairs: &[Pair]) {
     }
     let n = pairs.len() as f64;
     let mean = squares / n;
-    let sum = |of: &dyn Fn(&Pair) -> DVec3| pairs.iter().map(of).sum::<DVec3>().max_element();
+    let sum = |of: &dyn Fn(&Pair) -> DVec3| pairs.iter().map(of).sum::<DVec3>();
+    let theirs = sum(&|p| p.theirs);
+    let off = sum(&|p| p.ours) - theirs;
+    let error = sum(&|p| p.error * p.error).map(f64::sqrt);
     println!(
-        "{what}: {n} values; standard errors {:.1e}, difference of the sums {:.1e} (relative); \
-         mean square {mean:.2} units, largest {worst:.1}",
-        sum(&|p| p.error) / sum(&|p| p.theirs),
-        (sum(&|p| p.ours) - sum(&|p| p.theirs)) / sum(&|p| p.theirs),
+        "{what}: {n} values; relative standard errors {:.1e}; sums differ by {:.1e} of them, standard \
+         error {:.1e}; mean square {mean:.2} units, largest {worst:.1}",
+        (sum(&|p| p.error) / theirs).abs().max_element(),
+        (off / theirs).abs().max_element(),
+        (error / theirs).abs().max_element(),
     );
     assert!(mean.max_element() <= 1.0 + ERRORS * (2.0 / n).sqrt(), "{what}: {mean}");
+    let allowed = ERRORS * error + sum(&|p| p.overall);
+    assert!(off.abs().cmple(allowed).all(), "{what}: the sums differ by {off}, not {allowed}");
 }
 
 /// Asserts that the path tracer's offsets from surfaces matter less than its standard errors.

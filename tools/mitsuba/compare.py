@@ -51,13 +51,15 @@ def arguments():
     return parser.parse_args()
 
 
-def lumel_picture(typed):
+def lumel_picture(typed, width, height):
     with tempfile.TemporaryDirectory() as room:
         file = Path(room) / "view.exr"
-        lumel("render", typed.scene, "-o", file, "--size", typed.size, "--samples", ACROSS,
+        # With --samples light would be gathered once a pixel and face; so it is for each ray.
+        lumel("render", typed.scene, "-o", file, "--size", f"{ACROSS * width}x{ACROSS * height}",
               "--tolerance", typed.tolerance, "--quiet", *typed.options)
         picture = mi.Bitmap(str(file)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
-        return np.array(picture, dtype=np.float64).reshape(-1, 3)
+        fine = np.array(picture, dtype=np.float64).reshape(height, ACROSS, width, ACROSS, 3)
+        return fine.mean(axis=(1, 3)).reshape(-1, 3)
 
 
 def srgb(linear):
@@ -91,7 +93,7 @@ def main():
         return path.sample(scene, sampler, mi.RayDifferential3f(ray))[0]
 
     theirs, error, samples = trace.picture(value, rays, ACROSS, max(2, typed.samples), typed.seed)
-    ours = lumel_picture(typed)
+    ours = lumel_picture(typed, width, height)
     mean = theirs.mean()
     below = theirs**2 + 0.01 * mean**2
     print(f"mean relative squared error: {((ours - theirs) ** 2 / below).mean():.2e}, of which noise "

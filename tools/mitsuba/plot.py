@@ -1,7 +1,8 @@
 """Draws time_error.csv as time_error.svg: `python3 tools/mitsuba/plot.py`. Needs nothing but Python.
 
-A panel a scene, both axes logarithmic. Thin lines go on as 1/sqrt(time) from the last run of the
-path tracer, down to lumel's smallest error: what it would take.
+A panel a scene, both axes logarithmic. Dashed lines go on as 1/sqrt(time) from the last run of the
+path tracer, down to lumel's smallest error: what it would take. Also prints, as a table, the CPU
+seconds that each program needs for some errors, by straight lines between its runs in logarithms.
 """
 
 import csv
@@ -9,13 +10,13 @@ import math
 from pathlib import Path
 
 COLUMNS = ["scene", "program", "setting", "cpu_seconds", "rms_error", "against_path_tracing",
-           "standard_error_of_that"]
+           "noise_of_that"]
 COLOURS = {"lumel": "#0a6ebd", "mitsuba": "#c8511b"}
 NAMES = {"lumel": "lumel", "mitsuba": "Mitsuba 3, path"}
 TITLES = {"cornell": "Cornell box", "room": "room", "paper": "the paper's surface"}
 
 # Pixels: of a panel, and around it.
-WIDTH, HEIGHT, LEFT, TOP, BOTTOM, GAP = 270, 250, 62, 34, 46, 16
+WIDTH, HEIGHT, LEFT, TOP, BOTTOM, GAP = 270, 250, 84, 34, 46, 18
 
 
 def curves(path):
@@ -34,6 +35,30 @@ def slope(points):
     mt, me = (sum(v) / len(logs) for v in zip(*logs))
     below = sum((t - mt) ** 2 for t, _ in logs)
     return sum((t - mt) * (e - me) for t, e in logs) / below if below > 0 else math.nan
+
+
+def seconds(points, error, program):
+    """CPU seconds for an error, in words: `<` where the coarsest run is better, `(...)` where it is
+    what 1/sqrt(time) from the path tracer's last run says, nothing where lumel was not run so far."""
+    points = [p for p in points if p[1] > 0]
+    if points[0][1] <= error:
+        return f"< {points[0][0]:.2g}"
+    for (t0, e0), (t1, e1) in zip(points, points[1:]):
+        if e1 <= error < e0:
+            share = math.log(e0 / error) / math.log(e0 / e1)
+            return f"{t0 * (t1 / t0) ** share:.3g}"
+    t, e = points[-1]
+    return f"({float(f'{t * (e / error) ** 2:.2g}'):,.0f})" if program == "mitsuba" else ""
+
+
+def table(path, errors=(1e-2, 1e-3, 3e-4)):
+    """CPU seconds for these errors, as Markdown."""
+    heads = [f"{NAMES[p]}, {100 * e:g} %" for e in errors for p in ("lumel", "mitsuba")]
+    lines = ["| scene | " + " | ".join(heads) + " |", "|---" * (1 + len(heads)) + "|"]
+    for scene, programs in curves(path).items():
+        cells = [seconds(programs[p], e, p) for e in errors for p in ("lumel", "mitsuba")]
+        lines.append(f"| {TITLES.get(scene, scene)} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
 
 
 def decades(low, high):
@@ -75,7 +100,7 @@ def picture(path):
         y = (math.log10(point[1]) - errors[0]) / (errors[-1] - errors[0])
         return LEFT + panel * (WIDTH + GAP) + x * WIDTH, TOP + (1 - y) * HEIGHT
 
-    width = LEFT + len(found) * (WIDTH + GAP)
+    width = LEFT + len(found) * (WIDTH + GAP) + GAP
     out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{TOP + HEIGHT + BOTTOM}" '
            'font-family="sans-serif">', '<rect width="100%" height="100%" fill="white"/>']
     for panel, (scene, programs) in enumerate(found.items()):
@@ -114,3 +139,4 @@ def picture(path):
 if __name__ == "__main__":
     here = Path(__file__).resolve().parent
     (here / "time_error.svg").write_text(picture(here / "time_error.csv"))
+    print(table(here / "time_error.csv"))

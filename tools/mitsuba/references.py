@@ -8,7 +8,8 @@ For scenes/NAME.gltf (by default cornell, paper and room) writes tests/data/mits
   its area (so that small ones are seen too), then a place on it evenly, by NumPy's default
   generator with the seed that is written; the side is the one that radiates.
 - `view`: radiance of a small picture, each pixel the mean of ACROSS x ACROSS rays through the
-  middles of its parts: the same rays as `lumel render --samples`, so that edges count alike.
+  middles of its parts: the rays of a picture by lumel that is ACROSS times larger, so that edges
+  count alike.
 - `offset_bias`: how much irradiance at the points changes, relative to its sum, where rays start
   and end ten times farther from surfaces, by the same random numbers; and what Mitsuba's own
   `path` integrator differs by, whose offsets are larger still. The first is ten times the bias of

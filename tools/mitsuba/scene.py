@@ -177,8 +177,8 @@ def camera_rays(view, width, height, x, y):
 
 
 def sample_rays(view, width, height, across):
-    """Rays through the middles of across x across parts of each pixel, pixel by pixel: those of
-    `lumel render --samples`."""
+    """Rays through the middles of across x across parts of each pixel, pixel by pixel:
+    through the pixels of a picture that is so many times larger."""
     place = dr.arange(mi.UInt32, width * height * across**2)
     part, pixel = place % across**2, place // across**2
     x = mi.Float(pixel % width) + (mi.Float(part % across) + 0.5) / across

@@ -20,9 +20,11 @@ the largest root mean square.
   The error of a run R follows from two long runs A and B that are independent of it and each other:
   the mean of (R - A)(R - B) over all texels is the mean square error of R, without that of A and B.
 - lumel: CPU seconds are of the whole process. The error is the difference from a run with a far
-  smaller tolerance. That this is no error that all its runs share is seen by `against path
-  tracing`: the mean of (L - A)(L - B), with the standard error of that mean. Mitsuba's own bias
-  (offsets of rays in float32, at contacts) is part of it.
+  smaller tolerance. That its runs share no larger error is seen by the column
+  `against_path_tracing`, the root of the mean of (L - A)(L - B): it is at most about the column
+  `noise_of_that`, the root of the standard error of that mean, or else what is larger of lumel's
+  error and Mitsuba's bias (offsets of rays in float32, at contacts). Negative means are written as
+  negative roots.
 """
 
 import csv
@@ -194,6 +196,7 @@ def main():
         table.writerow(plot.COLUMNS)
         table.writerows(rows)
     (place / "time_error.svg").write_text(plot.picture(place / "time_error.csv"))
+    print(plot.table(place / "time_error.csv"))
     print(f"written to {place} after {time.time() - begin:.0f} s")
 
 
