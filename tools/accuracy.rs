@@ -10,7 +10,7 @@
 //!
 //! For other programs (`tools/mitsuba/time_error.py`), `--texels SCENE FILE` writes the points of all
 //! texels, and `--case SCENE WAY TOLERANCE FILE` runs one case and writes its texels where there is
-//! no such file yet: numbers of 8 bytes, little end first, see [`write_points`] and [`run_here`].
+//! no such file yet: numbers of 8 bytes, little end first, see [`Texels::write_points`] and [`run_here`].
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

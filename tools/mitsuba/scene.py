@@ -29,8 +29,9 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PROGRAM = Path(os.environ.get("LUMEL", ROOT / "target" / "release" / "lumel"))
 
 # Half the distance between the two sides of an emitting sheet, relative to the scene's size: large
-# enough that float32 (6e-8) tells them apart, too small for the light around their rims to matter.
-APART = 2e-6
+# enough that float32 (6e-8) tells them apart, and well below the height above surfaces at which
+# rays start (trace.NEAR), so that those of points on the sheet start in front of it.
+APART = 5e-7
 
 
 def start_mitsuba(threads=None):
