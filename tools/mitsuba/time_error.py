@@ -4,9 +4,9 @@ tracer at a ladder of samples, on the same texels.
     cargo build --release && .venv/mitsuba/bin/python tools/mitsuba/time_error.py [--quick] [NAME...]
 
 Writes tools/mitsuba/time_error.csv and, by plot.py, time_error.svg beside it. Both programs use
-THREADS threads, one after the other; nothing else should run. The whole run takes about 25 minutes
-on two threads; --quick takes about two, writes to the directory for temporary files, and shows only
-that everything works.
+THREADS threads, one after the other; nothing else should run. The whole run takes about half an
+hour on two threads; --quick takes about two minutes, writes to the directory for temporary files,
+and shows only that everything works.
 
 The quantity is irradiance on all texels of a scene, each the mean of 4 x 4 points
 (tools/accuracy.rs, which also runs lumel), relative to the mean over the texels; of the channels
