@@ -16,7 +16,7 @@ NAMES = {"lumel": "lumel", "mitsuba": "Mitsuba 3, path"}
 TITLES = {"cornell": "Cornell box", "room": "room", "paper": "the paper's surface"}
 
 # Pixels: of a panel, and around it.
-WIDTH, HEIGHT, LEFT, TOP, BOTTOM, GAP = 270, 250, 84, 34, 46, 18
+WIDTH, HEIGHT, LEFT, TOP, BOTTOM, GAP = 270, 250, 84, 34, 46, 36
 
 
 def curves(path):

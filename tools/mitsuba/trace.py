@@ -3,10 +3,10 @@
 Mitsuba does the work: rays, meshes, diffuse reflection, emitters and their sampling. The loop
 around it is this file's own, for one reason. In float32, Mitsuba's `path` starts each ray
 8.9e-5 (1 + |p|) above the surface and ends each shadow ray at 0.9991 of its length: what is nearer
-than that does not block, which brightens penumbrae (by about 0.1 % on the paper's surface). Here
-rays start NEAR times the scene's size above the surface, and shadow rays end as far before their
-target: fifty times less, and still thirty times the rounding of a position. What is left of it,
-`offset_bias` in tools/mitsuba/references.py measures by making NEAR ten times larger.
+than that does not block, which brightens penumbrae. Here rays start NEAR times the scene's size above
+the surface, and shadow rays end as far before their target: fifty times less, and still thirty times
+the rounding of a position. What is left of it, `offset_bias` in tools/mitsuba/references.py measures
+by making NEAR ten times larger.
 
 Everything else is unbiased: emitters are sampled at every vertex, and weighed against rays that
 hit them (balance heuristic); paths end by Russian roulette alone.
