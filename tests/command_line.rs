@@ -66,6 +66,39 @@ fn help_and_version_are_results() {
 }
 
 #[test]
+fn a_scene_is_exported_as_it_was_read() {
+    let room = room();
+    let output = lumel(
+        room.path(),
+        "inspect room.gltf --export scene.json --two-sided --light-scale 3 --size 20x10 --quiet",
+    );
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(stdout(&output).contains("materials (2)"));
+    let text = std::fs::read_to_string(room.path().join("scene.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let triangles = &json["triangles"];
+    for list in ["vertices", "material", "object", "reflectance", "radiance"] {
+        assert_eq!(triangles[list].as_array().unwrap().len(), 4, "{list}");
+    }
+    assert_eq!(json["materials"][1]["two_sided"], true);
+    // The lamp hangs 2 m above the floor, and three times as bright.
+    let lamp: Vec<f64> = serde_json::from_value(triangles["vertices"][2].clone()).unwrap();
+    assert_eq!([lamp[1], lamp[4], lamp[7]], [2.0; 3]);
+    let radiance: Vec<f64> = serde_json::from_value(triangles["radiance"][2].clone()).unwrap();
+    for (value, wanted) in radiance.iter().zip([3.0, 3.0, 1.5]) {
+        assert!((value - wanted).abs() < 1e-15);
+    }
+    assert_eq!(json["view"]["camera"], "Desk");
+    assert_eq!((&json["view"]["width"], &json["view"]["height"]), (&20.into(), &10.into()));
+
+    // The scene itself is no place to write to.
+    let output = lumel(room.path(), "inspect room.gltf --export room.gltf");
+    assert_ne!(code(&output), 0);
+    assert!(stderr(&output).contains("also an input"), "{}", stderr(&output));
+    assert_eq!(std::fs::read_to_string(room.path().join("room.gltf")).unwrap(), SCENE);
+}
+
+#[test]
 fn wrong_words_are_usage_errors_that_teach() {
     let room = room();
     for (words, parts) in [

@@ -7,16 +7,21 @@
 //! own; its CPU seconds are user and system time of all threads, from reading the file to the last
 //! texel, the estimate included. The error is the difference from a reference of a tolerance below the
 //! smallest of the cases, root mean square over the texels and largest, relative to the mean.
+//!
+//! For other programs (`tools/mitsuba/time_error.py`), `--texels SCENE FILE` writes the points of all
+//! texels, and `--case SCENE WAY TOLERANCE FILE` runs one case and writes its texels where there is
+//! no such file yet: numbers of 8 bytes, little end first, see [`Texels::write_points`] and [`run_here`].
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use glam::{DVec2, DVec3};
-use lumel::mesh::{Face, Mesh, barycentric};
+use lumel::mesh::{self, Face, Mesh, barycentric};
 use lumel::output::machine;
 use lumel::reconstruct::fill::RootPoints;
 use lumel::reconstruct::irradiance::irradiances;
-use lumel::scene::{ReadOptions, read};
+use lumel::scene::{ReadOptions, Scene, read};
+use lumel::solve::within::COARSEST;
 use lumel::solve::{Way, WithinOptions, light_within};
 use lumel::{Error, Monitor, Result};
 use serde_json::{Value, json};
@@ -113,6 +118,20 @@ impl Texels {
         }
     }
 
+    /// Writes all points, texel by texel: number of the texel, position, normal, input triangle.
+    fn write_points(&self, mesh: &Mesh, path: &Path) -> Result<()> {
+        let mut rows = vec![vec![]; self.count.len()];
+        for (asked, texels) in self.asked.iter().zip(&self.texel) {
+            let face = &mesh.faces[mesh.roots[asked.root as usize].face as usize];
+            for (&texel, &x) in texels.iter().zip(&asked.points) {
+                let (p, n) = (face.frame.lift(x), face.frame.n);
+                let triangle = f64::from(face.triangle);
+                rows[texel].extend([texel as f64, p.x, p.y, p.z, n.x, n.y, n.z, triangle]);
+            }
+        }
+        write_numbers(path, rows.into_iter().flatten())
+    }
+
     fn means(&self, values: &[Vec<DVec3>]) -> Vec<DVec3> {
         let mut sums = vec![DVec3::ZERO; self.count.len()];
         for (texels, values) in self.texel.iter().zip(values) {
@@ -128,6 +147,17 @@ fn failed(e: impl ToString) -> Error {
     Error::Runtime(e.to_string())
 }
 
+fn write_numbers(path: &Path, numbers: impl Iterator<Item = f64>) -> Result<()> {
+    let bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
+    std::fs::write(path, bytes).map_err(failed)
+}
+
+/// A shipped scene.
+fn shipped(name: &str) -> Result<Scene> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+    read(&path.with_extension("gltf"), &ReadOptions::default())
+}
+
 fn file_of(scene: &str) -> PathBuf {
     std::env::temp_dir().join(format!("lumel-accuracy-{}-{scene}", std::process::id()))
 }
@@ -136,8 +166,7 @@ fn file_of(scene: &str) -> PathBuf {
 /// written there where that does not exist yet.
 fn run_here(scene: &str, way: &str, tolerance: f64, reference: &Path) -> Result<Value> {
     let monitor = Monitor::silent();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene);
-    let scene = read(&path.with_extension("gltf"), &ReadOptions::default())?;
+    let scene = shipped(scene)?;
     let options = WithinOptions { way: way_of(way), ..WithinOptions::new(tolerance, u64::MAX) };
     let light = light_within(&scene, &options, &monitor)?;
     let source = light.apart().ok_or_else(|| failed("no tolerance"))?;
@@ -158,9 +187,7 @@ fn run_here(scene: &str, way: &str, tolerance: f64, reference: &Path) -> Result<
         "maximum estimate": estimate.maximum + counts.largest_error(estimate.mean),
     });
     if !reference.exists() {
-        let numbers: Vec<u8> =
-            means.iter().flat_map(|h| h.to_array()).flat_map(f64::to_le_bytes).collect();
-        std::fs::write(reference, numbers).map_err(failed)?;
+        write_numbers(reference, means.iter().flat_map(|h| h.to_array()))?;
         return Ok(result);
     }
     let numbers = std::fs::read(reference).map_err(failed)?;
@@ -196,6 +223,13 @@ fn main() -> Result<()> {
         let tolerance = tolerance.parse().unwrap_or(0.01);
         println!("{}", run_here(scene, way, tolerance, Path::new(reference))?);
         return Ok(());
+    }
+    if let [flag, scene, path] = &words[..]
+        && flag == "--texels"
+    {
+        // The faces and roots of every mesh of a scene are those of the coarsest one.
+        let mesh = mesh::build(&shipped(scene)?, &COARSEST)?;
+        return Texels::new(&mesh).write_points(&mesh, Path::new(path));
     }
     println!(
         "| scene | texels | way | tolerance | error rms | estimate | estimate / error | largest error | \

@@ -56,7 +56,9 @@ pub enum Command {
 Examples:
   lumel inspect room.gltf
   lumel inspect room.gltf --json | jq .materials
-  lumel inspect room.obj --eye 0,1.6,4 --look-at 0,1,0    checks a view before rendering it")]
+  lumel inspect room.obj --eye 0,1.6,4 --look-at 0,1,0    checks a view before rendering it
+  lumel inspect room.gltf --export room.json
+      Triangles, sides, light and view as they were read, for other programs.")]
 pub struct InspectArgs {
     /// The scene and how to read it.
     #[command(flatten)]
@@ -64,6 +66,10 @@ pub struct InspectArgs {
     /// Print JSON instead of text
     #[arg(long, help_heading = None::<&str>)]
     pub json: bool,
+    /// Also write the scene as it was read to this file as JSON: triangles in world space, their
+    /// sides, reflectance and radiance (means where there are textures), and the view
+    #[arg(long, value_name = "FILE", help_heading = None::<&str>)]
+    pub export: Option<PathBuf>,
     /// The view to check.
     #[command(flatten)]
     pub view: ViewArgs,

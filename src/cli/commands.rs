@@ -4,6 +4,7 @@ use std::path::Path;
 
 use lumel::output::camera_matrices::CameraMatrices;
 use lumel::output::csv;
+use lumel::output::export::write_export;
 use lumel::output::picture::{Picture, Quantity, write_picture};
 use lumel::render::{self, RenderOptions};
 use lumel::solve::Light;
@@ -28,8 +29,9 @@ pub fn run(cli: Cli) -> Result<()> {
 
 fn inspect(settings: &InspectSettings) -> Result<()> {
     let path = settings.scene.path.as_path();
+    let outputs: Vec<&Path> = settings.export.as_deref().into_iter().collect();
     let mut session =
-        Session::begin("inspect", path, &[], &[], settings.described(), &settings.run)?;
+        Session::begin("inspect", path, &[], &outputs, settings.described(), &settings.run)?;
     let progress = Progress::new(settings.run.quiet);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
@@ -38,6 +40,10 @@ fn inspect(settings: &InspectSettings) -> Result<()> {
     let view = view::choose(&scene, &settings.view)?;
     let forecast = session.forecast(&scene, &settings.solve)?;
     let description = session.clock.time("describe", || inspect::describe(&scene, &view, forecast));
+    if let Some(path) = &settings.export {
+        let size = (view.width, view.height);
+        session.clock.time("write", || write_export(path, &scene, &view.camera, size))?;
+    }
     progress.clear();
     let text = if settings.json {
         let json = serde_json::to_string_pretty(&description);

@@ -131,6 +131,8 @@ pub struct InspectSettings {
     pub run: RunSettings,
     /// Whether to print JSON.
     pub json: bool,
+    /// Where to write the scene as it was read.
+    pub export: Option<PathBuf>,
 }
 
 /// `lumel render`.
@@ -180,6 +182,7 @@ impl InspectSettings {
             solve: solve(&args.solve)?,
             run: run(args.run),
             json: args.json,
+            export: args.export,
         })
     }
 

@@ -1,4 +1,4 @@
-//! Results on disk: pictures, tables of values, reports.
+//! Results on disk: pictures, tables of values, reports, scenes for other programs.
 //!
 //! Everything is first encoded in memory by a function from data to bytes and then put in its
 //! place by [`atomic::write_whole`]: a file is written whole or not at all, and the same data
@@ -8,6 +8,7 @@
 pub mod atomic;
 pub mod camera_matrices;
 pub mod csv;
+pub mod export;
 pub mod exr_file;
 pub mod hdr_file;
 pub mod machine;
