@@ -1,6 +1,7 @@
 //! Scenes of many small faces: light from bundles of rays agrees with exact visibility.
 
 mod common;
+#[allow(dead_code)]
 #[path = "common/random.rs"]
 mod random;
 #[path = "common/rooms.rs"]

@@ -1,8 +1,5 @@
 //! Random numbers that follow from a seed.
 
-// Each test takes what it needs.
-#![allow(dead_code)]
-
 use glam::{DMat3, DVec3};
 
 /// SplitMix64 (Steele, Lea & Flood 2014): every test scene follows from one number.
