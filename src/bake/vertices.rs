@@ -83,10 +83,12 @@ pub struct LitSurface {
     pub counts: IrradianceCounts,
 }
 
-/// Finds the light at the vertices of a scene that was solved.
+/// Finds the light at the vertices of a scene that was solved; of triangles that are not `wanted` it
+/// is zero, and they are refined only as far as their neighbours are.
 pub fn vertex_light(
     scene: &Scene,
     light: &Light,
+    wanted: &[bool],
     options: &VertexOptions,
     monitor: &Monitor,
 ) -> Result<LitSurface> {
@@ -94,6 +96,7 @@ pub fn vertex_light(
     let mut work = Work {
         scene,
         light,
+        wanted,
         monitor,
         mesh: Conforming::new(&light.mesh, exact),
         values: HashMap::new(),
@@ -160,6 +163,7 @@ struct Looked {
 struct Work<'a, 'm> {
     scene: &'a Scene,
     light: &'a Light,
+    wanted: &'a [bool],
     monitor: &'a Monitor<'m>,
     mesh: Conforming,
     /// Irradiance at a vertex as seen from a root.
@@ -192,14 +196,16 @@ impl Work<'_, '_> {
     /// Finds the values of corners that have none yet.
     fn gather_corners(&mut self) -> Result<()> {
         let mut wanted: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for t in &self.mesh.triangles {
-            for v in t.corners {
-                if !self.values.contains_key(&(t.root, v)) {
-                    self.values.insert((t.root, v), DVec3::ZERO);
-                    wanted.entry(t.root).or_default().push(v);
-                }
-            }
+        for t in self.mesh.triangles.iter().filter(|t| self.is_wanted(t)) {
+            let unknown =
+                t.corners.into_iter().filter(|&v| !self.values.contains_key(&(t.root, v)));
+            wanted.entry(t.root).or_default().extend(unknown);
         }
+        wanted.values_mut().for_each(|own| {
+            own.sort_unstable();
+            own.dedup();
+        });
+        wanted.retain(|_, own| !own.is_empty());
         let points = wanted.iter().map(|(&root, own)| {
             let places = own.iter().map(|&v| self.place(root, self.mesh.positions[v as usize]));
             (root, places.collect())
@@ -214,13 +220,29 @@ impl Work<'_, '_> {
         Ok(())
     }
 
+    fn triangle(&self, t: &Tri) -> usize {
+        let mesh = &self.light.mesh;
+        mesh.faces[mesh.roots[t.root as usize].face as usize].triangle as usize
+    }
+
+    fn is_wanted(&self, t: &Tri) -> bool {
+        self.wanted[self.triangle(t)]
+    }
+
     fn corners(&self, t: &Tri) -> [DVec3; 3] {
         t.corners.map(|v| self.mesh.positions[v as usize])
     }
 
     /// Looks at triangles that have not been looked at, in points at most `spacing` apart.
     fn look(&mut self, errors: &mut [Option<Looked>], spacing: f64) -> Result<()> {
-        let fresh: Vec<usize> = (0..errors.len()).filter(|&i| errors[i].is_none()).collect();
+        let mut fresh: Vec<usize> = (0..errors.len()).filter(|&i| errors[i].is_none()).collect();
+        fresh.retain(|&i| {
+            let wanted = self.is_wanted(&self.mesh.triangles[i]);
+            if !wanted {
+                errors[i] = Some(Looked { area: 0.0, mean: DVec3::ZERO, square: 0.0 });
+            }
+            wanted
+        });
         let mut points: BTreeMap<u32, Vec<DVec2>> = BTreeMap::new();
         // Where the points of each begin in those of its root, and its lattice.
         let mut begins = vec![];
@@ -242,9 +264,7 @@ impl Work<'_, '_> {
             let t = self.mesh.triangles[i];
             let corners = self.corners(&t);
             let at_corners = t.corners.map(|v| self.values[&(t.root, v)]);
-            let face = self.light.mesh.roots[t.root as usize].face;
-            let triangle = self.light.mesh.faces[face as usize].triangle as usize;
-            let reflects = scene::reflectance(self.scene, triangle, &whole) != DVec3::ZERO;
+            let reflects = scene::reflectance(self.scene, self.triangle(&t), &whole) != DVec3::ZERO;
             let (mut sum, mut square, mut count) = (DVec3::ZERO, 0.0, 0.0);
             for (w, value) in lattice(parts).zip(&by_root[&t.root][begin..]) {
                 let off = (*value - weighted(w, at_corners)).abs().max_element();
@@ -293,7 +313,10 @@ impl Work<'_, '_> {
                 back: face.back,
                 corners,
                 weights: corners.map(|p| face.triangle_weights(face.frame.project(p))),
-                irradiance: t.corners.map(|v| self.values[&(t.root, v)].max(DVec3::ZERO)),
+                irradiance: t.corners.map(|v| {
+                    let known = self.values.get(&(t.root, v)).copied();
+                    known.map_or(DVec3::ZERO, |value| value.max(DVec3::ZERO))
+                }),
             });
         }
         lit

@@ -34,6 +34,7 @@ pub struct Document {
     /// Top-level arrays by name, such as `nodes`.
     arrays: Map<String, Value>,
     extensions: Vec<&'static str>,
+    default_scene: bool,
     views: Vec<Value>,
     bytes: Vec<u8>,
     images: Vec<Image>,
@@ -52,6 +53,11 @@ impl Document {
             }
             _ => unreachable!("only arrays are made here"),
         }
+    }
+
+    /// Makes the first scene the one that is shown.
+    pub fn default_scene(&mut self) {
+        self.default_scene = true;
     }
 
     /// Notes that an extension is used.
@@ -172,6 +178,9 @@ impl Document {
             asset["extras"] = self.extras;
         }
         root.insert("asset".into(), asset);
+        if self.default_scene {
+            root.insert("scene".into(), json!(0));
+        }
         if let Some(buffer) = buffer {
             root.insert("buffers".into(), json!([buffer]));
             root.insert("bufferViews".into(), Value::Array(self.views));
