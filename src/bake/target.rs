@@ -10,9 +10,9 @@
 //! | `blender` | H/pi | as read; base colour times the texel is what to emit (as of a Cycles bake of diffuse light without colour) |
 //!
 //! In every one of them the coordinates are `TEXCOORD_1` with the origin at the top left, as glTF has
-//! it, and the first row of each picture is the top one. three.js reads EXR and HDR pictures upside
-//! down (their first row is at v = 1), see [`Target::note`]; Blender's importer of glTF turns the
-//! coordinates itself.
+//! it, and the first row of each picture is the top one. three.js reads EXR pictures upside down
+//! (their first row comes last), see [`Target::note`]; Blender's importer of glTF turns the coordinates
+//! itself.
 
 use crate::output::picture::Quantity;
 
@@ -65,10 +65,10 @@ impl Target {
                 "open the file as it is: its colours are radiance times 2^exposure_ev, in sRGB"
             }
             Target::Three => {
-                "material.lightMap = texture of userData.lightmap.image with channel = 1 and flipY \
-                 = false for .png, true for .exr and .hdr (whose first row three.js takes for the \
-                 bottom one); material.lightMapIntensity = userData.lightmap.scale; .png: colorSpace \
-                 = SRGBColorSpace"
+                "material.lightMap = texture of userData.lightmap.image with channel = 1 and flipY = \
+                 true for .exr (which three.js reads from its last row), false for .hdr and .png; \
+                 material.lightMapIntensity = userData.lightmap.scale; for .png also colorSpace = \
+                 SRGBColorSpace"
             }
             Target::Bevy => {
                 "insert Lightmap { image } (loaded as linear data, .png as sRGB) beside each mesh whose \
