@@ -18,7 +18,7 @@ use crate::scene::Scene;
 
 /// Two triangles that meet at a greater angle (radians) have a crease between them: 20 degrees, more
 /// than between the facets of a cylinder of 20.
-const CREASE: f64 = 0.35;
+pub(super) const CREASE: f64 = 0.35;
 
 /// Greatest angle between a triangle of a chart and the first one (radians): 30 degrees, so that
 /// nothing is stretched by more than 1.16.
