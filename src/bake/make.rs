@@ -168,7 +168,6 @@ fn check(options: &AtlasOptions) -> Result<()> {
     Ok(())
 }
 
-/// Which triangles are to be baked.
 /// Of every triangle whether the name of its object or of its material fits one of `only`; all where
 /// there are none.
 ///
