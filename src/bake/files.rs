@@ -369,16 +369,9 @@ impl Stored {
         if let Some(surface) = &surface {
             parts.push(surface.exitance.iter().map(|e| stored(e.as_dvec3() / pi)).collect());
         }
-        let total = texels
-            .clone()
-            .map(|i| {
-                let irradiance =
-                    (map.direct[i].as_dvec3() + map.indirect[i].as_dvec3()).max(DVec3::ZERO);
-                let emitted =
-                    surface.as_ref().map_or(DVec3::ZERO, |s| s.exitance[i].as_dvec3() / pi);
-                stored(of(i) * irradiance + emitted)
-            })
-            .collect();
+        // The sum of what the layers hold: none of it is negative.
+        let sum = |i: usize| parts.iter().fold(Vec3::ZERO, |sum, part| sum + Vec3::from(part[i]));
+        let total = texels.clone().map(|i| sum(i).to_array()).collect();
         let emits = |i: usize| surface.as_ref().is_some_and(|s| s.exitance[i] != Vec3::ZERO);
         let weight = |i: usize| if emits(i) { 0.0 } else { f64::from(map.covered[i]) };
         let weights = texels.map(weight).collect();

@@ -1,8 +1,8 @@
 //! What the surface under each texel reflects and emits.
 //!
-//! Of each texel the part of it that each triangle covers is cut out as a polygon, and reflectance
-//! and exitance are averaged over all parts by their area: the same averages as of elements and
-//! pixels ([`crate::scene::reflectance`]). Texels that nothing covers take over what the nearest
+//! Of each texel the part of it that each triangle covers is cut out as a polygon (`raster`), and
+//! reflectance and exitance are averaged over all parts by their area: the same averages as of elements
+//! and pixels ([`crate::scene::reflectance`]). Texels that nothing covers take over what the nearest
 //! ones have (in steps across edges of texels; of equally near ones the first row by row), so that
 //! interpolation across the edge of a chart finds its own colour.
 
@@ -10,6 +10,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::atlas::Atlas;
+use super::raster::parts;
 use crate::error::Result;
 use crate::mesh::barycentric;
 use crate::monitor::Monitor;
@@ -148,73 +149,34 @@ impl Placed {
 
     /// Adds its parts in some rows.
     fn add(&self, scene: &Scene, rows: (u32, u32), width: u32, sums: &mut [Sum]) {
-        let [a, b, c] = self.corners;
-        if (b - a).perp_dot(c - a) == 0.0 {
-            return;
-        }
-        let whole = rows_of(&self.corners, rows.1);
-        for y in whole.0.max(rows.0)..whole.1 {
-            let strip = within(&self.corners, |p| p.y, f64::from(y));
-            let (low, high) = range(strip.iter().map(|p| p.x));
-            if strip.len() < 3 {
-                continue;
-            }
-            let first = low.floor().clamp(0.0, f64::from(width)) as u32;
-            let last = high.ceil().clamp(f64::from(first), f64::from(width)) as u32;
-            for x in first..last {
-                let part = within(&strip, |p| p.x, f64::from(x));
-                self.add_part(scene, &part, &mut sums[((y - rows.0) * width + x) as usize]);
-            }
-        }
-    }
-
-    fn add_part(&self, scene: &Scene, part: &[DVec2], sum: &mut Sum) {
-        for k in 2..part.len() {
-            let corners = [part[0], part[k - 1], part[k]];
-            let area = 0.5 * (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]).abs();
-            if area == 0.0 {
-                continue;
-            }
+        parts(&self.corners, rows.0..rows.1, width, |part| {
             let (reflectance, exitance) = self.same.unwrap_or_else(|| {
-                let footprint = corners.map(|p| barycentric(&self.corners, p));
+                // A triangle of the size of the part, around its centroid.
+                let size = (2.0 * part.area).sqrt();
+                let around = [[-1.0, -1.0], [2.0, -1.0], [-1.0, 2.0]].map(DVec2::from);
+                let footprint = around.map(|d| {
+                    let w = barycentric(&self.corners, part.centre + size / 3.0 * d);
+                    // Not beyond the triangle, where its colours end.
+                    let w = w.max(DVec3::ZERO);
+                    w / w.element_sum()
+                });
                 (
                     scene::reflectance(scene, self.triangle, &footprint),
                     scene::exitance(scene, self.triangle, &footprint),
                 )
             });
-            sum.area += area;
-            sum.reflectance += area * reflectance;
-            sum.exitance += area * exitance;
-        }
+            let sum = &mut sums[((part.row - rows.0) * width + part.column) as usize];
+            sum.area += part.area;
+            sum.reflectance += part.area * reflectance;
+            sum.exitance += part.area * exitance;
+        });
     }
-}
-
-/// The part of a convex polygon with `from` <= axis <= `from` + 1.
-fn within(polygon: &[DVec2], axis: impl Fn(DVec2) -> f64, from: f64) -> Vec<DVec2> {
-    let above = clipped(polygon, |p| axis(p) - from);
-    clipped(&above, |p| from + 1.0 - axis(p))
-}
-
-/// The part of a convex polygon where `inside` is not negative.
-fn clipped(polygon: &[DVec2], inside: impl Fn(DVec2) -> f64) -> Vec<DVec2> {
-    let mut part = Vec::with_capacity(polygon.len() + 1);
-    for (k, &p) in polygon.iter().enumerate() {
-        let q = polygon[(k + 1) % polygon.len()];
-        let (d, e) = (inside(p), inside(q));
-        if d >= 0.0 {
-            part.push(p);
-        }
-        if (d > 0.0 && e < 0.0) || (d < 0.0 && e > 0.0) {
-            part.push(p.lerp(q, d / (d - e)));
-        }
-    }
-    part
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::atlas::Page;
     use super::*;
-    use crate::bake::atlas::Page;
     use crate::scene::{Material, Triangle};
 
     /// A square over part of a page, its lower half of another colour.

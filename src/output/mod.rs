@@ -1,4 +1,4 @@
-//! Results on disk: pictures, tables of values, reports.
+//! Results on disk: pictures, scenes, tables of values, reports.
 //!
 //! Everything is first encoded in memory by a function from data to bytes and then put in its
 //! place by [`atomic::write_whole`]: a file is written whole or not at all, and the same data
