@@ -333,7 +333,7 @@ fn lattice(parts: u32) -> impl Iterator<Item = DVec3> {
     let n = f64::from(parts);
     let points = (0..=parts).flat_map(move |j| (0..=parts - j).map(move |i| (i, j)));
     let inner = points.filter(move |&(i, j)| i != parts && j != parts && i + j != 0);
-    let centroid = (parts % 3 != 0).then_some(DVec3::splat(1.0 / 3.0));
+    let centroid = (!parts.is_multiple_of(3)).then_some(DVec3::splat(1.0 / 3.0));
     inner
         .map(move |(i, j)| DVec3::new(f64::from(parts - i - j), f64::from(i), f64::from(j)) / n)
         .chain(centroid)

@@ -28,6 +28,9 @@ pub struct Image {
     pub png: Vec<u8>,
 }
 
+/// The name of a file and what is in it.
+pub type NamedFile = (String, Vec<u8>);
+
 /// A file that grows.
 #[derive(Default)]
 pub struct Document {
@@ -155,7 +158,7 @@ impl Document {
     }
 
     /// The JSON text, and the files beside it by name: the buffer `buffer_file` and the images.
-    pub fn to_gltf(mut self, buffer_file: &str) -> Result<(Vec<u8>, Vec<(String, Vec<u8>)>)> {
+    pub fn to_gltf(mut self, buffer_file: &str) -> Result<(Vec<u8>, Vec<NamedFile>)> {
         let mut beside = vec![];
         for image in std::mem::take(&mut self.images) {
             let uri = escaped(&image.file);
