@@ -22,7 +22,7 @@ pub(super) const CREASE: f64 = 0.35;
 
 /// Greatest angle between a triangle of a chart and the first one (radians): 30 degrees, so that
 /// nothing is stretched by more than 1.16.
-const CONE: f64 = 0.5236;
+const CONE: f64 = std::f64::consts::FRAC_PI_6;
 
 /// Normals that differ by at most this (radians) are of one plane, as far as charts go: distances are
 /// right to half of its square.
@@ -182,7 +182,7 @@ impl<'a> Cutter<'a> {
         }
         let object = of(triangles[0]).object;
         let mut chart = Flat { object, triangles, corners, size: DVec2::ZERO };
-        chart.to_origin();
+        chart.move_to_origin();
         chart
     }
 }
@@ -194,7 +194,7 @@ const MOST_DIRECTIONS: usize = 64;
 const AS_GOOD: f64 = 1e-9;
 
 impl Flat {
-    fn to_origin(&mut self) {
+    fn move_to_origin(&mut self) {
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for x in self.corners.iter().flatten() {
             (low, high) = (low.min(*x), high.max(*x));
@@ -230,7 +230,7 @@ impl Flat {
             for x in self.corners.iter_mut().flatten() {
                 *x = DVec2::new(along.dot(*x), along.perp_dot(*x));
             }
-            self.to_origin();
+            self.move_to_origin();
         }
     }
 }

@@ -78,7 +78,13 @@ pub(super) fn continued(
             let high = from.max(to) + REACH;
             let (low, high) = (low.max(DVec2::ZERO).as_uvec2(), high.min(texels).ceil().as_uvec2());
             for row in low.y..high.y {
-                for column in low.x..high.x {
+                // Along the row both places below change evenly.
+                let start = DVec2::new(0.5, f64::from(row) + 0.5) - from;
+                let (near, far) = within(start.dot(outward), outward.x, 0.0, REACH);
+                let (left, right) = within(start.dot(along), along.x, -REACH, length + REACH);
+                let first = near.max(left).max(f64::from(low.x)).floor() as u32;
+                let last = (far.min(right) + 1.0).clamp(0.0, f64::from(high.x)).ceil() as u32;
+                for column in first..last {
                     let texel = row * size.width + column;
                     if covered[texel as usize] > 0.0 {
                         continue;
@@ -149,6 +155,16 @@ fn turned(step: DVec3, edge: DVec3, n: DVec3, m: DVec3) -> DVec3 {
         Some(across) if length > 0.0 => side + sign * length * across,
         _ => step,
     }
+}
+
+/// Where start + k slope is between two values: the least and the greatest k.
+fn within(start: f64, slope: f64, least: f64, most: f64) -> (f64, f64) {
+    if slope == 0.0 {
+        let is_inside = (least..=most).contains(&start);
+        return if is_inside { (f64::NEG_INFINITY, f64::INFINITY) } else { (0.0, -1.0) };
+    }
+    let (a, b) = ((least - start) / slope, (most - start) / slope);
+    (a.min(b), a.max(b))
 }
 
 type Key = [[u64; 3]; 2];
@@ -243,6 +259,14 @@ mod tests {
         let mut zeros = vec![Vec3::ZERO; 4];
         dilate(2, 2, &mut none, [&mut zeros, &mut [Vec3::ZERO; 4]]);
         assert_eq!(none, [false; 4]);
+    }
+
+    #[test]
+    fn places_between_two_values() {
+        assert_eq!(within(1.0, -0.5, 0.0, 2.0), (-2.0, 2.0));
+        assert_eq!(within(1.0, 0.0, 0.0, 2.0), (f64::NEG_INFINITY, f64::INFINITY));
+        let (a, b) = within(3.0, 0.0, 0.0, 2.0);
+        assert!(a > b);
     }
 
     #[test]

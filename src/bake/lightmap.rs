@@ -85,7 +85,7 @@ pub fn bake_lightmaps(
         for (part, layer) in [(Part::Direct, &mut direct), (Part::Indirect, &mut indirect)] {
             let (values, _) = irradiances_of(light, part, &on.asked, monitor)?;
             for (value, texel) in values.iter().flatten().zip(on.texels.iter().flatten()) {
-                layer[*texel as usize] = value.as_vec3();
+                layer[*texel as usize] = value.max(DVec3::ZERO).as_vec3();
                 has_value[*texel as usize] = true;
             }
         }

@@ -25,7 +25,7 @@ const LISTED: usize = 30;
 ///
 /// A second set of texture coordinates that can hold a lightmap ([`super::second_set`]) is kept:
 /// as it is, on one page, where that of all objects together can; else each object that has one
-/// gets its unit square as a part of a page. All others get charts ([`super::charts`]).
+/// gets its unit square as a part of a page. All others get charts (`charts`).
 ///
 /// Charts have whole numbers of texels along both sides, at least one, and those that would be larger
 /// than a page are made as large as one.

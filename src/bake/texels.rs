@@ -222,7 +222,8 @@ impl Sampler<'_, '_> {
         }
         for (k, (sum, weight)) in sums.into_iter().enumerate() {
             if weight > 0.0 {
-                found(first as usize + k, (sum / weight).as_vec3());
+                // Filling in may reach a little below zero where it is dark.
+                found(first as usize + k, (sum / weight).max(DVec3::ZERO).as_vec3());
             }
         }
         Ok(())
