@@ -16,6 +16,8 @@ Examples:
       What is in the file: faces, materials, lamps, cameras, and what was odd.
   lumel render room.gltf -o view.png --tolerance 0.3%
       The view of the file's first camera, irradiance right to 0.3 % (root mean square).
+  lumel bake room.gltf -o baked.glb
+      The scene with its light in lightmaps, for any viewer of glTF.
   lumel probe room.obj --points desk.csv -o lux.csv --emission 'Lamp*=40,38,30'
       Irradiance at given points, with the radiance of the lamps set by hand.
 
@@ -44,6 +46,8 @@ pub enum Command {
     Inspect(InspectArgs),
     /// Make a picture of a scene as a camera sees it
     Render(RenderArgs),
+    /// Write a scene with its light in it: lightmaps, or colours of vertices
+    Bake(BakeArgs),
     /// Measure irradiance and radiosity at points given in a table
     Probe(ProbeArgs),
     /// Repeat the experiments of Atkinson and Chien (2006), beside the printed tables
@@ -104,6 +108,39 @@ pub struct RenderArgs {
     /// How to make the picture.
     #[command(flatten)]
     pub picture: PictureArgs,
+    /// How to solve.
+    #[command(flatten)]
+    pub solve: SolveArgs,
+    /// How to run.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// `lumel bake`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Written beside OUT.glb are OUT-lightmap.exr (and OUT-lightmap-1.exr ... for further pages) and
+OUT-bake.json, which says which texels belong to what, what they measure and how good they are.
+
+Examples:
+  lumel bake room.gltf -o baked.glb
+      Shows its light in any viewer of glTF. Lightmap coordinates are TEXCOORD_1.
+  lumel bake room.gltf -o baked.glb --target three --texels-per-metre 40 --tolerance 0.3%
+      Keeps the materials; the lightmap holds irradiance, as three.js wants it.
+  lumel bake room.gltf -o baked.glb --only 'Wall*' --only Floor --density Floor=100
+      Only some objects, lit by all; the floor finer than the rest.
+  lumel bake room.gltf -o baked.glb --to vertices --max-triangles 20000
+      Colours at vertices, on triangles as fine as the light asks for.")]
+pub struct BakeArgs {
+    /// The scene and how to read it.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Scene to write: .glb, or .gltf with its buffer and pictures beside it
+    #[arg(short, long, value_name = "FILE", help_heading = None::<&str>)]
+    pub output: PathBuf,
+    /// What to bake and how.
+    #[command(flatten)]
+    pub bake: BakingArgs,
     /// How to solve.
     #[command(flatten)]
     pub solve: SolveArgs,
@@ -235,6 +272,88 @@ pub struct PictureArgs {
     /// Samples along each side of a pixel: N makes N x N a pixel
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=64))]
     pub samples: u32,
+}
+
+/// What to bake and how.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Bake")]
+pub struct BakingArgs {
+    /// Where the light goes
+    #[arg(long, value_enum, default_value = "lightmap")]
+    pub to: ToArg,
+    /// Who will show it, which decides the quantity and the materials
+    #[arg(long, value_enum, default_value = "unlit")]
+    pub target: TargetArg,
+    /// Bake only objects and materials of this name, where * stands for anything; may be repeated
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
+    /// Texels to a metre [default: as many as one page of --size holds]
+    #[arg(long, value_name = "N", value_parser = values::positive, allow_negative_numbers = true)]
+    pub texels_per_metre: Option<f64>,
+    /// Texels to a metre for some objects or materials, e.g. 'Floor*=100'; may be repeated
+    #[arg(long, value_name = "NAME=N", value_parser = values::density)]
+    pub density: Vec<(String, f64)>,
+    /// Texels along the sides of a page [default: 1024, or no more than needed with --texels-per-metre]
+    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(4..=16384))]
+    pub size: Option<u32>,
+    /// Texels along the sides of a page at most; what does not fit goes to a further page
+    #[arg(long, value_name = "TEXELS", default_value = "4096", value_parser = clap::value_parser!(u32).range(4..=16384))]
+    pub max_size: u32,
+    /// Texels around each chart that take over its light
+    #[arg(long, value_name = "TEXELS", default_value = "2", value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub padding: u32,
+    /// Make new lightmap coordinates even where the file has good ones (its second set)
+    #[arg(long)]
+    pub new_coordinates: bool,
+    /// Format of the lightmaps: linear .exr or .hdr, or .png of 16 bits in sRGB
+    #[arg(long, value_enum, default_value = "exr")]
+    pub format: FormatArg,
+    /// Store 16-bit floats in .exr files instead of 32-bit ones
+    #[arg(long)]
+    pub half: bool,
+    /// Also store direct and indirect light apart, as layers of the .exr files
+    #[arg(long)]
+    pub layers: bool,
+    /// Brighten what has a limited range (.png, unlit materials, colours of vertices) by 2^EV
+    /// [default: so that next to nothing is brighter than white]
+    #[arg(long, value_name = "EV", value_parser = values::exposure, allow_negative_numbers = true)]
+    pub exposure: Option<f64>,
+    /// With --to vertices: refine up to so many triangles
+    #[arg(long, value_name = "N", default_value = "200000", value_parser = clap::value_parser!(u32).range(1..=20_000_000))]
+    pub max_triangles: u32,
+}
+
+/// Where baked light goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ToArg {
+    /// Pictures on the surface
+    Lightmap,
+    /// Colours of vertices, on refined triangles
+    Vertices,
+}
+
+/// Who shows baked light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TargetArg {
+    /// Any viewer: unlit materials with the light as their colour
+    Unlit,
+    /// three.js: irradiance, for lightMap of its materials
+    Three,
+    /// Bevy: irradiance/pi, for its component Lightmap
+    Bevy,
+    /// Blender: irradiance/pi, as from a bake of diffuse light without colour
+    Blender,
+}
+
+/// Format of lightmaps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FormatArg {
+    /// OpenEXR
+    Exr,
+    /// Radiance HDR
+    Hdr,
+    /// PNG, 16 bits a channel, sRGB
+    Png,
 }
 
 /// How to solve.

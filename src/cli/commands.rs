@@ -11,10 +11,11 @@ use lumel::solve::Light;
 use lumel::{Error, Monitor, Result, probe, reference};
 
 use super::args::{Cli, Command};
+use super::bake_settings::BakeSettings;
 use super::progress::Progress;
 use super::session::Session;
 use super::settings::{InspectSettings, ProbeSettings, ReferenceSettings, RenderSettings};
-use super::{console, inspect, interrupt, reference_text, view};
+use super::{bake, console, inspect, interrupt, reference_text, view};
 
 /// Does what was typed.
 pub fn run(cli: Cli) -> Result<()> {
@@ -22,6 +23,7 @@ pub fn run(cli: Cli) -> Result<()> {
     match cli.command {
         Command::Inspect(args) => inspect(&InspectSettings::new(args)?),
         Command::Render(args) => render(&RenderSettings::new(args)?),
+        Command::Bake(args) => bake::bake(&BakeSettings::new(args)?),
         Command::Probe(args) => probe(&ProbeSettings::new(args)?),
         Command::Reference(args) => tables(&ReferenceSettings::new(args)),
     }
@@ -146,7 +148,7 @@ fn probe(settings: &ProbeSettings) -> Result<()> {
 }
 
 /// What watches over the making of the output: when time ran out, the best result is still written.
-fn for_output<'a>(
+pub fn for_output<'a>(
     monitor: Monitor<'a>,
     light: &Light,
     tell: &'a (dyn Fn(&'static str, u64, u64) + Sync),
@@ -156,7 +158,7 @@ fn for_output<'a>(
 }
 
 /// Whether the light is as good as was asked for, with errors of `filled` from filling in.
-fn met(light: &Light, filled: f64) -> Result<()> {
+pub fn met(light: &Light, filled: f64) -> Result<()> {
     let Some(source) = light.apart() else { return Ok(()) };
     let error = source.estimate.rms.hypot(filled);
     let why = match &source.shortfall {

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use lumel::bake::second_sets;
 use lumel::scene::{self, Camera, Projection, Scene};
 use serde::Serialize;
 
@@ -26,6 +27,8 @@ pub struct Description {
     /// Light that all emitters send out, W.
     power: [f64; 3],
     cameras: Vec<CameraLine>,
+    /// Objects whose second set of texture coordinates cannot hold a lightmap.
+    lightmap_coordinates: Vec<CoordinatesLine>,
     view: ViewLine,
     /// What solving it would take.
     forecast: Forecast,
@@ -64,6 +67,21 @@ struct CameraLine {
 enum ProjectionLine {
     Perspective { vertical_fov_degrees: f64, aspect: Option<f64> },
     Orthographic { half_width: f64, half_height: f64 },
+}
+
+/// Faces of an object by what is wrong with their second set of texture coordinates.
+#[derive(Debug, Serialize)]
+struct CoordinatesLine {
+    object: String,
+    faces: usize,
+    /// It has none.
+    missing: usize,
+    /// Others without area.
+    flat: usize,
+    /// A corner is outside of the unit square.
+    outside: usize,
+    /// They overlap others.
+    overlapping: usize,
 }
 
 #[derive(Debug, Serialize)]
@@ -123,6 +141,18 @@ pub fn describe(scene: &Scene, view: &View, forecast: Forecast) -> Description {
         materials,
         power: power.into(),
         cameras: scene.cameras.iter().enumerate().map(camera_line).collect(),
+        lightmap_coordinates: second_sets(scene)
+            .iter()
+            .filter(|set| set.triangles > 0 && !set.is_valid())
+            .map(|set| CoordinatesLine {
+                object: scene.objects[set.object as usize].name.clone(),
+                faces: set.triangles,
+                missing: set.missing,
+                flat: set.flat,
+                outside: set.outside,
+                overlapping: set.overlapping,
+            })
+            .collect(),
         view: ViewLine {
             camera: view.camera.name.clone(),
             eye: view.camera.eye.into(),
@@ -222,11 +252,39 @@ impl Description {
         text.push_str(&self.materials_text());
         text.push_str(&self.emitters_text());
         text.push_str(&self.cameras_text());
+        text.push_str(&self.coordinates_text());
         if !self.notices.is_empty() {
             text.push_str(&format!("\nnotices ({})\n", self.notices.len()));
             for notice in &self.notices {
                 text.push_str(&format!("  {}\n", notice.line));
             }
+        }
+        text
+    }
+
+    /// What is wrong with second sets of texture coordinates; those that are missing altogether are
+    /// the usual case, and counted.
+    fn coordinates_text(&self) -> String {
+        let (missing, bad): (Vec<_>, Vec<_>) =
+            self.lightmap_coordinates.iter().partition(|line| line.missing == line.faces);
+        let mut text = String::new();
+        if !missing.is_empty() {
+            text.push_str(&format!(
+                "\nlightmap coordinates (TEXCOORD_1)\n  missing in {} of {} objects: bake makes them\n",
+                missing.len(),
+                self.objects
+            ));
+        }
+        if !bad.is_empty() {
+            let head = ["not usable", "faces", "missing", "flat", "outside", "overlapping"];
+            let mut table = Table::new(&head);
+            for line in bad {
+                let counts = [line.faces, line.missing, line.flat, line.outside, line.overlapping];
+                let counts = counts.iter().map(|n| n.to_string());
+                table.row([line.object.clone()].into_iter().chain(counts).collect());
+            }
+            let head = if text.is_empty() { "\nlightmap coordinates (TEXCOORD_1)\n" } else { "" };
+            text.push_str(&format!("{head}{}  bake makes new ones for these\n", table.to_text()));
         }
         text
     }

@@ -6,6 +6,8 @@
 
 pub mod advice;
 pub mod args;
+pub mod bake;
+pub mod bake_settings;
 pub mod commands;
 pub mod console;
 pub mod forecast;

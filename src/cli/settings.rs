@@ -425,7 +425,7 @@ impl RunSettings {
     }
 }
 
-fn scene(args: SceneArgs) -> SceneSettings {
+pub(super) fn scene(args: SceneArgs) -> SceneSettings {
     let options = ReadOptions {
         two_sided: args.two_sided,
         light_scale: args.light_scale,
@@ -466,7 +466,7 @@ fn up(eye: DVec3, look_at: DVec3, typed: Option<DVec3>) -> Result<DVec3> {
     }
 }
 
-fn solve(args: &SolveArgs) -> Result<SolveSettings> {
+pub(super) fn solve(args: &SolveArgs) -> Result<SolveSettings> {
     let refinement = match (args.max_edge, args.subdivide) {
         (Some(length), _) => Refinement::MaxEdge(length),
         (None, Some(levels)) => Refinement::Levels(levels),
@@ -509,7 +509,7 @@ fn max_memory(typed: MemorySize, usable: Option<u64>) -> Option<u64> {
     }
 }
 
-fn run(args: RunArgs) -> RunSettings {
+pub(super) fn run(args: RunArgs) -> RunSettings {
     RunSettings {
         time_limit: args.time_limit,
         threads: args.threads.map(usize::from),
@@ -518,7 +518,7 @@ fn run(args: RunArgs) -> RunSettings {
     }
 }
 
-fn pair(name: &str, value: impl ToString) -> (String, String) {
+pub(super) fn pair(name: &str, value: impl ToString) -> (String, String) {
     (name.into(), value.to_string())
 }
 

@@ -113,6 +113,17 @@ pub fn direction(text: &str) -> Result<DVec3, String> {
     }
 }
 
+/// A name and texels to a metre.
+pub fn density(text: &str) -> Result<(String, f64), String> {
+    let expected = "expected NAME=N with N texels to a metre, such as 'Floor*=100'";
+    match text.rsplit_once('=') {
+        Some((name, number)) if !name.is_empty() => {
+            positive(number).map(|n| (name.to_string(), n)).map_err(|_| expected.into())
+        }
+        _ => Err(expected.into()),
+    }
+}
+
 /// A limit of memory: bytes with a unit, or per cent of what there is.
 pub fn memory_size(text: &str) -> Result<MemorySize, String> {
     let teach = || {
@@ -158,6 +169,14 @@ mod tests {
         assert_eq!(memory_size("75%"), Ok(MemorySize::Share(0.75)));
         for wrong in ["", "2", "GiB", "-1GB", "0MB", "0%", "101%", "2 gigs", "1.2.3MB", "nan%"] {
             assert!(memory_size(wrong).unwrap_err().contains("2GiB"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn densities_have_a_name_and_a_number() {
+        assert_eq!(density("a=b=2.5"), Ok(("a=b".into(), 2.5)));
+        for wrong in ["a", "=2", "a=0", "a=x", ""] {
+            assert!(density(wrong).unwrap_err().contains("Floor"), "{wrong}");
         }
     }
 

@@ -23,6 +23,26 @@ pub fn write_whole(target: &Path, bytes: &[u8]) -> Result<()> {
     replace(target, bytes).map_err(|e| unwritable(target, e))
 }
 
+/// Writes several files that belong together, the last one last.
+///
+/// All are written whole under temporary names first; only then are they put in their places, one
+/// after the other. Whatever fails before that (a full disk, a directory that is gone) leaves all old
+/// files as they were. `go_on` is asked once between the two: an error of its ends the writing.
+pub fn write_together(
+    files: &[(PathBuf, Vec<u8>)],
+    go_on: impl FnOnce() -> Result<()>,
+) -> Result<()> {
+    let mut ready = vec![];
+    for (target, bytes) in files {
+        ready.push((target, prepare(target, bytes).map_err(|e| unwritable(target, e))?));
+    }
+    go_on()?;
+    for (target, prepared) in ready {
+        prepared.put_in_place().map_err(|e| unwritable(target, e))?;
+    }
+    Ok(())
+}
+
 /// Checks, before long work begins, that `target` can be written later.
 ///
 /// Refused are: a directory, a file that is read-only, a directory that does not exist or takes
@@ -79,27 +99,49 @@ fn unwritable(target: &Path, reason: impl ToString) -> Error {
 }
 
 fn replace(target: &Path, bytes: &[u8]) -> io::Result<()> {
+    prepare(target, bytes)?.put_in_place()
+}
+
+/// A file that is ready to be put in its place.
+enum Prepared<'a> {
+    /// Written under a temporary name.
+    Temporary(Temporary, PathBuf),
+    /// Written directly when its time comes.
+    Special(File, &'a [u8]),
+}
+
+fn prepare<'a>(target: &Path, bytes: &'a [u8]) -> io::Result<Prepared<'a>> {
     let found = fs::metadata(target).ok();
     if found.as_ref().is_some_and(|found| !found.is_file() && !found.is_dir()) {
-        let mut special = OpenOptions::new().write(true).open(target)?;
-        special.write_all(bytes)?;
-        return special.flush();
+        return Ok(Prepared::Special(OpenOptions::new().write(true).open(target)?, bytes));
     }
     let place = resolved(target);
-    let directory = directory_of(&place);
-    let mut temporary = Temporary::create(directory)?;
+    let mut temporary = Temporary::create(directory_of(&place))?;
     temporary.file.write_all(bytes)?;
     if let Some(found) = found {
         temporary.file.set_permissions(found.permissions())?;
     }
     temporary.file.sync_all()?;
-    temporary.rename(&place)?;
-    // The data are safe; that the *name* survives a power cut too is worth a try, no more: not
-    // every file system lets a directory be synchronised.
-    if let Ok(directory) = File::open(directory) {
-        let _ = directory.sync_all();
+    Ok(Prepared::Temporary(temporary, place))
+}
+
+impl Prepared<'_> {
+    fn put_in_place(self) -> io::Result<()> {
+        let (temporary, place) = match self {
+            Prepared::Special(mut special, bytes) => {
+                special.write_all(bytes)?;
+                return special.flush();
+            }
+            Prepared::Temporary(temporary, place) => (temporary, place),
+        };
+        temporary.rename(&place)?;
+        // The data are safe; that the *name* survives a power cut too is worth a try, no more: not
+        // every file system lets a directory be synchronised.
+        if let Ok(directory) = File::open(directory_of(&place)) {
+            let _ = directory.sync_all();
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 /// The file that a chain of symbolic links leads to; the path itself where there is none.
@@ -221,6 +263,24 @@ mod tests {
         assert!(check_writable(&input, &[]).unwrap_err().to_string().contains("read-only"));
         assert!(check_writable(Path::new(""), &[]).is_err());
         assert_eq!(names_in(room.path()), ["scene.gltf"], "the check leaves nothing behind");
+    }
+
+    #[test]
+    fn files_that_belong_together_are_all_written_or_none() {
+        let room = tempfile::tempdir().unwrap();
+        let at = |name: &str| room.path().join(name);
+        fs::write(at("a"), b"old").unwrap();
+        let files = |second: &str| vec![(at("a"), b"new".to_vec()), (at(second), b"b".to_vec())];
+        // The second has no directory to go to; then somebody interrupts.
+        assert!(write_together(&files("no/b"), || Ok(())).is_err());
+        assert!(write_together(&files("b"), || Err(Error::Interrupted)).is_err());
+        assert_eq!(
+            (fs::read(at("a")).unwrap(), names_in(room.path())),
+            (b"old".into(), vec!["a".into()])
+        );
+        write_together(&files("b"), || Ok(())).unwrap();
+        assert_eq!(fs::read(at("a")).unwrap(), b"new");
+        assert_eq!(names_in(room.path()), ["a", "b"]);
     }
 
     #[cfg(unix)]

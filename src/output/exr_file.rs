@@ -1,4 +1,4 @@
-//! OpenEXR pictures: linear f32 channels R, G, B in scan lines, with what they mean as attributes.
+//! OpenEXR pictures: linear channels R, G, B (f32, or f16) in scan lines, further layers beside them, with what they mean as attributes.
 //!
 //! Attributes: `chromaticities` (of sRGB: Rec. 709 primaries, D65), `software`, `worldToCamera`
 //! and `worldToNDC` where there is a camera, `lumel:quantity`, `lumel:unit`, and each setting as
@@ -17,8 +17,8 @@
 use std::io::Cursor;
 
 use exr::prelude::{
-    AttributeValue, Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder,
-    SpecificChannels, Text, WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples, Image,
+    Layer, LayerAttributes, LineOrder, Text, WritableImage, f16,
 };
 
 use crate::error::{Error, Result};
@@ -28,6 +28,9 @@ use crate::output::picture::Picture;
 /// How pixel blocks are compressed.
 const COMPRESSION: Compression = Compression::PIZ;
 
+/// The largest number of f16.
+const LARGEST_HALF: f32 = 65504.0;
+
 /// Chromaticities of linear sRGB: x, y of red, green, blue and white.
 const SRGB: exr::meta::attribute::Chromaticities = exr::meta::attribute::Chromaticities {
     red: exr::math::Vec2(0.64, 0.33),
@@ -36,8 +39,23 @@ const SRGB: exr::meta::attribute::Chromaticities = exr::meta::attribute::Chromat
     white: exr::math::Vec2(0.3127, 0.3290),
 };
 
+/// What else a file holds, and how.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ExrOptions<'a> {
+    /// Whether values are f16 (up to 65504, eleven bits of mantissa) instead of f32.
+    pub half: bool,
+    /// Further layers by name, each with as many pixels as the picture: channels `NAME.R`, `NAME.G`
+    /// and `NAME.B` beside R, G and B of the picture itself.
+    pub layers: &'a [(&'a str, &'a [[f32; 3]])],
+}
+
 /// Encodes a picture whose pixel count fits its size.
 pub fn encode(picture: &Picture) -> Result<Vec<u8>> {
+    encode_with(picture, &ExrOptions::default())
+}
+
+/// Encodes a picture whose pixel count, and that of its layers, fits its size.
+pub fn encode_with(picture: &Picture, options: &ExrOptions) -> Result<Vec<u8>> {
     let failed = |e: &dyn std::fmt::Display| Error::Runtime(format!("EXR: {e}"));
     let (width, height) = (picture.width as usize, picture.height as usize);
 
@@ -59,11 +77,22 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>> {
         blocks: Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    let pixels = SpecificChannels::rgb(|at: exr::math::Vec2<usize>| {
-        let [r, g, b] = picture.pixels[at.y() * width + at.x()];
-        (r, g, b)
+    let own = [("", picture.pixels.as_slice())];
+    let channels = own.iter().chain(options.layers).flat_map(|(layer, pixels)| {
+        ["R", "G", "B"].into_iter().enumerate().map(move |(k, channel)| {
+            let dot = if layer.is_empty() { "" } else { "." };
+            let values = pixels.iter().map(move |p| p[k]);
+            let samples = if options.half {
+                // What is too large for f16 stays finite.
+                FlatSamples::F16(values.map(|v| f16::from_f32(v.min(LARGEST_HALF))).collect())
+            } else {
+                FlatSamples::F32(values.collect())
+            };
+            AnyChannel::new(text(&format!("{layer}{dot}{channel}")), samples)
+        })
     });
-    let mut image = Image::from_layer(Layer::new((width, height), attributes, encoding, pixels));
+    let channels = AnyChannels::sort(channels.collect());
+    let mut image = Image::from_layer(Layer::new((width, height), attributes, encoding, channels));
     image.attributes.chromaticities = Some(SRGB);
     let mut bytes = Vec::new();
     image.write().non_parallel().to_buffered(Cursor::new(&mut bytes)).map_err(|e| failed(&e))?;

@@ -1,4 +1,4 @@
-//! Results on disk: pictures, tables of values, reports, scenes for other programs.
+//! Results on disk: pictures, baked scenes, tables of values, reports, scenes for others.
 //!
 //! Everything is first encoded in memory by a function from data to bytes and then put in its
 //! place by [`atomic::write_whole`]: a file is written whole or not at all, and the same data
@@ -10,6 +10,9 @@ pub mod camera_matrices;
 pub mod csv;
 pub mod export;
 pub mod exr_file;
+pub mod gltf_file;
+pub mod gltf_mesh;
+pub mod gltf_scene;
 pub mod hdr_file;
 pub mod machine;
 pub mod picture;

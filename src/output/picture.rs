@@ -13,6 +13,8 @@ pub enum Quantity {
     Radiance,
     /// Irradiance, W/m^2.
     Irradiance,
+    /// Irradiance / pi: the radiance of a white surface, W/(m^2 sr).
+    IrradianceOverPi,
     /// Radiosity, W/m^2.
     Radiosity,
     /// Error of the irradiance relative to its mean over the surface.
@@ -25,6 +27,7 @@ impl Quantity {
         match self {
             Quantity::Radiance => "radiance",
             Quantity::Irradiance => "irradiance",
+            Quantity::IrradianceOverPi => "irradiance/pi",
             Quantity::Radiosity => "radiosity",
             Quantity::RelativeError => "relative error of irradiance",
         }
@@ -33,7 +36,7 @@ impl Quantity {
     /// Its unit in files.
     pub fn unit(self) -> &'static str {
         match self {
-            Quantity::Radiance => "W/(m^2 sr)",
+            Quantity::Radiance | Quantity::IrradianceOverPi => "W/(m^2 sr)",
             Quantity::Irradiance | Quantity::Radiosity => "W/m^2",
             Quantity::RelativeError => "1",
         }

@@ -51,6 +51,15 @@ pub struct FillCounts {
     pub largest: f64,
 }
 
+impl std::ops::AddAssign for FillCounts {
+    fn add_assign(&mut self, more: FillCounts) {
+        self.points += more.points;
+        self.gathered += more.gathered;
+        self.squares += more.squares;
+        self.largest = self.largest.max(more.largest);
+    }
+}
+
 /// Error of what is filled in, over what its check was off by (both root mean squares): an eighth for
 /// the third derivatives that quadratics miss, more where light is not that smooth. Measured over
 /// the shipped scenes.

@@ -30,13 +30,8 @@ pub struct IrradianceCounts {
 
 impl std::ops::AddAssign for IrradianceCounts {
     fn add_assign(&mut self, other: IrradianceCounts) {
-        for (own, more) in [(&mut self.direct, other.direct), (&mut self.indirect, other.indirect)]
-        {
-            own.points += more.points;
-            own.gathered += more.gathered;
-            own.squares += more.squares;
-            own.largest = own.largest.max(more.largest);
-        }
+        self.direct += other.direct;
+        self.indirect += other.indirect;
     }
 }
 
@@ -66,12 +61,43 @@ pub fn irradiances(
     asked: &[RootPoints],
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, IrradianceCounts)> {
+    let (mut values, direct) = irradiances_of(light, Part::Direct, asked, monitor)?;
+    if light.apart().is_none() {
+        return Ok((values, IrradianceCounts { direct, ..IrradianceCounts::default() }));
+    }
+    let (reflected, indirect) = irradiances_of(light, Part::Indirect, asked, monitor)?;
+    for (sum, more) in values.iter_mut().flatten().zip(reflected.into_iter().flatten()) {
+        *sum += more;
+    }
+    Ok((values, IrradianceCounts { direct, indirect }))
+}
+
+/// A part of the irradiance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// What emitters send straight away; all light, where a solution does not tell it apart.
+    Direct,
+    /// What surfaces reflect; nothing, where a solution does not tell it apart.
+    Indirect,
+}
+
+/// One part of what [`irradiances`] finds.
+pub fn irradiances_of(
+    light: &Light,
+    part: Part,
+    asked: &[RootPoints],
+    monitor: &Monitor,
+) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
     let Some(source) = light.apart() else {
+        if part == Part::Indirect {
+            let zeros = asked.iter().map(|own| vec![DVec3::ZERO; own.points.len()]).collect();
+            return Ok((zeros, FillCounts::default()));
+        }
         let place = |root: u32, x: DVec2| {
             let frame = &light.mesh.faces[light.mesh.roots[root as usize].face as usize].frame;
             (frame.lift(x), frame.n)
         };
-        let (values, direct) = fill(
+        return fill(
             &light.mesh,
             asked,
             0.0,
@@ -82,18 +108,16 @@ pub fn irradiances(
             },
             |()| usize::MAX,
             monitor,
-        )?;
-        return Ok((values, IrradianceCounts { direct, ..IrradianceCounts::default() }));
+        );
     };
     let checked = CHECKED * source.tolerance * source.estimate.mean.max_element();
-    let how = (source.allowed_direct, checked, SHADED);
-    let (mut values, direct) = from_radiant(light, &source.emitters, how, asked, monitor)?;
-    let (reflected, indirect) =
-        from_reflected(light, source, &source.reflected, checked, asked, monitor)?;
-    for (sum, more) in values.iter_mut().flatten().zip(reflected.into_iter().flatten()) {
-        *sum += more;
+    match part {
+        Part::Direct => {
+            let how = (source.allowed_direct, checked, SHADED);
+            from_radiant(light, &source.emitters, how, asked, monitor)
+        }
+        Part::Indirect => from_reflected(light, source, &source.reflected, checked, asked, monitor),
     }
-    Ok((values, IrradianceCounts { direct, indirect }))
 }
 
 /// What reflected light changed by from the next coarser solution to this one, at points of roots:

@@ -1,5 +1,7 @@
 //! Finding the surface: along a ray, or at a point.
 
+use std::cell::Cell;
+
 use glam::{DVec2, DVec3};
 
 use crate::geometry::{Bounds, BoxTree, ray};
@@ -105,6 +107,29 @@ impl<'a> Surface<'a> {
             }
         }
         best.map(|(_, _, foot)| foot)
+    }
+
+    /// Whether a radiating face, not of triangle `but`, lies on a point within `tolerance` (metres)
+    /// and faces against `normal`.
+    pub fn is_faced(&self, point: DVec3, normal: DVec3, tolerance: f64, but: u32) -> bool {
+        // Faces that touch are parallel but for their roundings over their size.
+        const AGAINST: f64 = -0.999;
+        let near = Bounds { min: point, max: point }.grown(tolerance);
+        let found = Cell::new(false);
+        self.tree.visit(
+            |b| !found.get() && b.meets(near),
+            |i| {
+                let covers = i as u32 != but
+                    && self.sides[i].into_iter().flatten().any(|face| {
+                        let f = &self.mesh.faces[face as usize];
+                        let (x, height) = (f.frame.project(point), f.frame.height(point));
+                        f.frame.n.dot(normal) < AGAINST
+                            && distance_to(&f.corners, x).hypot(height) <= tolerance
+                    });
+                found.set(found.get() || covers);
+            },
+        );
+        found.get()
     }
 }
 

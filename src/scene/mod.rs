@@ -50,7 +50,7 @@ pub use camera::{Camera, Projection, look_at};
 pub use default_view::default_camera;
 pub use limits::MAX_REFLECTANCE;
 pub use overlaps::{Overlaps, resolve as resolve_overlaps};
-pub use overrides::Override;
+pub use overrides::{Override, name_fits};
 pub use read::{ReadOptions, read};
 pub use texture::{Texture, TextureUse, Wrap};
 

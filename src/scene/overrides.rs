@@ -63,27 +63,7 @@ impl Override {
 
     /// Whether a material's name fits the pattern.
     pub fn matches(&self, name: &str) -> bool {
-        let pattern: Vec<char> = self.pattern.chars().collect();
-        let name: Vec<char> = name.chars().collect();
-        let (mut p, mut n) = (0, 0);
-        // Where to go on when a later part does not fit: let the last star take one more.
-        let mut retry: Option<(usize, usize)> = None;
-        while n < name.len() {
-            if p < pattern.len() && pattern[p] == '*' {
-                retry = Some((p + 1, n));
-                p += 1;
-            } else if p < pattern.len() && pattern[p] == name[n] {
-                p += 1;
-                n += 1;
-            } else if let Some((after, taken)) = retry {
-                retry = Some((after, taken + 1));
-                p = after;
-                n = taken + 1;
-            } else {
-                return false;
-            }
-        }
-        pattern[p..].iter().all(|&c| c == '*')
+        name_fits(&self.pattern, name)
     }
 
     fn check(&self) -> std::result::Result<(), String> {
@@ -95,6 +75,31 @@ impl Override {
         }
         Ok(())
     }
+}
+
+/// Whether a name fits a pattern, in which `*` stands for any run of characters.
+pub fn name_fits(pattern: &str, name: &str) -> bool {
+    let pattern: Vec<char> = pattern.chars().collect();
+    let name: Vec<char> = name.chars().collect();
+    let (mut p, mut n) = (0, 0);
+    // Where to go on when a later part does not fit: let the last star take one more.
+    let mut retry: Option<(usize, usize)> = None;
+    while n < name.len() {
+        if p < pattern.len() && pattern[p] == '*' {
+            retry = Some((p + 1, n));
+            p += 1;
+        } else if p < pattern.len() && pattern[p] == name[n] {
+            p += 1;
+            n += 1;
+        } else if let Some((after, taken)) = retry {
+            retry = Some((after, taken + 1));
+            p = after;
+            n = taken + 1;
+        } else {
+            return false;
+        }
+    }
+    pattern[p..].iter().all(|&c| c == '*')
 }
 
 /// Changes the materials of a scene as the options ask.
