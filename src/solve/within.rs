@@ -130,7 +130,7 @@ pub struct Estimate {
 /// coarser one was from the coarsest mesh, and worse than it has to be.
 pub(super) fn of_change(reduction: f64) -> f64 {
     const MARGIN: f64 = 1.3;
-    const FIRST: f64 = 0.54;
+    const FIRST: f64 = 0.5;
     /// Never less, however fast errors seem to fall: along rims they fall slowly, and are last to go.
     /// Never more, since steps with four times the elements do divide them.
     const BELIEVED: (f64, f64) = (0.7, 3.0);
