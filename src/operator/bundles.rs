@@ -196,6 +196,21 @@ impl Rows {
         self.buried[spot]
     }
 
+    /// Smallest and largest share of the rays of a spot that meet something that radiates; of spots
+    /// that are not buried.
+    pub fn sums(&self) -> (f64, f64) {
+        let mut begin = 0;
+        let mut all = (1.0f64, 0.0f64);
+        for (&end, buried) in self.ends.iter().zip(&self.buried) {
+            let sum: f64 = self.entries[begin..end].iter().map(|e| f64::from(e.1)).sum();
+            begin = end;
+            if !buried {
+                all = (all.0.min(sum), all.1.max(sum));
+            }
+        }
+        all
+    }
+
     /// Pairs of a spot and a patch that are stored.
     pub fn entries(&self) -> usize {
         self.entries.len()

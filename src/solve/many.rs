@@ -79,6 +79,7 @@ struct Step {
     varies: Vec<bool>,
     entries: usize,
     bytes: usize,
+    row_sums: (f64, f64),
     iterations: usize,
     residual: DVec3,
 }
@@ -162,7 +163,7 @@ pub fn light_of_many(
         bytes: step.bytes,
         counts,
         seconds: vec![],
-        row_sums: (0.0, 1.0),
+        row_sums: step.row_sums,
     })
 }
 
@@ -330,6 +331,7 @@ impl Ladder<'_> {
             varies,
             entries: rows.entries(),
             bytes: rows.bytes(),
+            row_sums: rows.sums(),
             iterations,
             residual: DVec3::from_array(residual),
         })
