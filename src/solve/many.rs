@@ -317,6 +317,14 @@ impl Ladder<'_> {
         let residual = (share::RESIDUAL * tolerance).clamp(1e-13, 1e-3);
         let how = SolveOptions { residual, ..SolveOptions::default() };
         let (u, residual, iterations) = gmres(&apply, &begin, None, &how, self.monitor)?;
+        // What is not a number has not converged either.
+        if !residual.iter().all(|&r| r <= how.residual) {
+            return Err(Error::NotConverged {
+                residual: residual.into_iter().fold(0.0, f64::max),
+                iterations,
+                tolerance: how.residual,
+            });
+        }
         let mut at_spots = rows.at_spots(&u);
         for (h, d) in at_spots.iter_mut().zip(&rows.direct) {
             (0..3).for_each(|c| h[c] += d[c]);
