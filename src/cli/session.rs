@@ -109,6 +109,10 @@ impl Session {
             report.value("estimated error rms", estimate.rms);
             report.value("estimated error maximum", estimate.maximum);
             report.channels("mean irradiance", estimate.mean.to_array());
+            if let Some(rays) = &source.rays {
+                report.value("share of irradiance that rays estimate", rays.share);
+                report.value("estimated error of rays rms", rays.error);
+            }
         }
         let contacts = light.mesh.contacts;
         report.count("faces cut at contacts", contacts.cut);
