@@ -20,7 +20,7 @@ use super::gltf_mesh::{self, MaterialId};
 use super::gltf_nodes::{self, Placed};
 use super::limits::MAX_TRIANGLES;
 use super::notices::Notices;
-use super::{Object, Scene, Triangle, gltf_guard};
+use super::{Object, Scene, Triangle, gltf_guard, uri};
 use crate::error::{Error, Result};
 
 /// A glTF document with its bytes.
@@ -97,6 +97,9 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
     scene.materials = materials.list;
     scene.textures = materials.textures;
     scene.notices = notices.into_list();
+    let buffers = root.buffers.iter().filter_map(|b| b.uri.as_deref());
+    let images = root.images.iter().filter_map(|i| i.uri.as_deref());
+    scene.files = buffers.chain(images).filter_map(|uri| uri::file_of(path, uri)).collect();
     Ok(scene)
 }
 
