@@ -75,6 +75,18 @@ fn coordinates_that_are_no_numbers() {
     refused("bad.obj", "v 1e200 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 3", Invalid, &["object", "1e30"]);
 }
 
+/// The crate that reads glTF cuts indices to 32 bits.
+#[test]
+fn indices_beyond_32_bits() {
+    let huge = 1u64 << 32;
+    let g = changed(|j| j["nodes"][0]["mesh"] = json!(huge));
+    refused_gltf(&g, Invalid, &["mesh", "4294967296", "export it again"]);
+    let g = changed(|j| j["accessors"][0]["componentType"] = json!(huge + 5126));
+    refused_gltf(&g, Invalid, &["componentType", "4294972422"]);
+    let g = changed(|j| j["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(huge));
+    refused_gltf(&g, Invalid, &["POSITION", "4294967296"]);
+}
+
 /// Found by a broken file: pi times the largest number is none.
 #[test]
 fn emission_beyond_reason() {

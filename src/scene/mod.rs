@@ -25,6 +25,7 @@ mod gltf_buffers;
 mod gltf_exact;
 mod gltf_file;
 mod gltf_guard;
+mod gltf_index;
 mod gltf_material;
 mod gltf_mesh;
 mod gltf_nodes;

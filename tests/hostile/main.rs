@@ -155,7 +155,7 @@ fn write(folder: &Path, good: &Good, number: u64) -> PathBuf {
     good.beside.iter().for_each(|(name, bytes)| fs::write(folder.join(name), bytes).unwrap());
     let is_scene = |name: &&str| !name.ends_with(".mtl") && !name.ends_with(".png");
     let names = [good.name.as_str()].into_iter().chain(good.beside.iter().map(|b| b.0.as_str()));
-    folder.join(names.filter(is_scene).last().unwrap())
+    folder.join(names.filter(is_scene).next_back().unwrap())
 }
 
 /// What every scene that is read must be.
