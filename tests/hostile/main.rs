@@ -154,8 +154,9 @@ fn write(folder: &Path, good: &Good, number: u64) -> PathBuf {
     fs::write(folder.join(&good.name), bytes).unwrap();
     good.beside.iter().for_each(|(name, bytes)| fs::write(folder.join(name), bytes).unwrap());
     let is_scene = |name: &&str| !name.ends_with(".mtl") && !name.ends_with(".png");
-    let names = [good.name.as_str()].into_iter().chain(good.beside.iter().map(|b| b.0.as_str()));
-    folder.join(names.filter(is_scene).next_back().unwrap())
+    let mut names =
+        [good.name.as_str()].into_iter().chain(good.beside.iter().map(|b| b.0.as_str()));
+    folder.join(names.rfind(is_scene).unwrap())
 }
 
 /// What every scene that is read must be.
