@@ -6,6 +6,7 @@ pub mod circle;
 pub mod contact;
 pub mod convex;
 pub mod frame;
+mod nested;
 pub mod polygon;
 pub mod ray;
 pub mod ray_tree;
