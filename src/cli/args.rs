@@ -62,7 +62,9 @@ Examples:
   lumel inspect room.gltf --json | jq .materials
   lumel inspect room.obj --eye 0,1.6,4 --look-at 0,1,0    checks a view before rendering it
   lumel inspect room.gltf --export room.json
-      Triangles, sides, light and view as they were read, for other programs.")]
+      Triangles, sides, light and view as they were read, for other programs.
+  lumel inspect room.gltf --audit
+      Also what is wrong with it: leaks, flipped and buried faces, lamps that nothing sees.")]
 pub struct InspectArgs {
     /// The scene and how to read it.
     #[command(flatten)]
@@ -70,6 +72,10 @@ pub struct InspectArgs {
     /// Print JSON instead of text
     #[arg(long, help_heading = None::<&str>)]
     pub json: bool,
+    /// Also look for mistakes in the scene: leaks, faces that are flipped, buried or counted twice,
+    /// lamps that nothing sees
+    #[arg(long, help_heading = None::<&str>)]
+    pub audit: bool,
     /// Also write the scene as it was read to this file as JSON: triangles in world space, their
     /// sides, reflectance and radiance (means where there are textures), and the view
     #[arg(long, value_name = "FILE", help_heading = None::<&str>)]
