@@ -3,7 +3,7 @@
 //! Rays that meet nothing *escape*. Sides all of whose rays do look outward: the outside of a house,
 //! the bottom of what stands on the floor. They do not count. If of the others' rays more than the
 //! share [`OPEN`] escapes, the scene is open, and that is all that is said of it. Else what looks
-//! outward in part ([`OUTSIDE`]), or mostly at black backs ([`super::sides`]), lies outside and does
+//! outward in part ([`OUTSIDE`]), or mostly at black backs ([`super::buried`]), lies outside and does
 //! not count either: what stands behind a wall, or was pushed through it. The rest is closed when no ray of it escapes, and *leaks* otherwise: where lines of escaped
 //! rays cross, there is the gap.
 
@@ -13,9 +13,9 @@ use glam::{DMat3, DVec3};
 use serde::Serialize;
 
 use super::Surveyed;
+use super::buried::is_buried;
 use super::finding::{Finding, Kind, Severity, percent};
 use super::look::direction_of;
-use super::sides;
 use crate::geometry::Bounds;
 
 /// Share of escaped rays above which a scene is open: a door is more, a gap under it less.
@@ -111,8 +111,7 @@ pub(super) fn find(survey: &Surveyed, turned: &[bool]) -> (Closure, Vec<Finding>
         (all, objects)
     };
     let sees = |i: usize| shares[i] < 1.0;
-    let is_inside =
-        |i: usize| shares[i] < OUTSIDE && !sides::is_buried(survey, &survey.looks[i], turned);
+    let is_inside = |i: usize| shares[i] < OUTSIDE && !is_buried(survey, &survey.looks[i], turned);
     let (all, of_all) = sums(&sees);
     let is_open = all.at.is_none() || all.mean() > OPEN;
     let (counted, objects) = if is_open { (all, of_all.clone()) } else { sums(&is_inside) };

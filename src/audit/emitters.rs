@@ -73,7 +73,7 @@ pub(super) fn find(survey: &Surveyed, turned: &[bool], reflects: &[bool]) -> Vec
 }
 
 fn lights(survey: &Surveyed, turned: &[bool]) -> BTreeMap<u32, Light> {
-    let parts = &survey.parts;
+    let parts = survey.parts;
     let mut lights: BTreeMap<u32, Light> = BTreeMap::new();
     for (point, look) in survey.each() {
         let power = survey.exitance[point.triangle as usize] * point.area;

@@ -85,6 +85,12 @@ impl Finding {
     }
 }
 
+/// Findings by the area that they are about.
+pub(super) fn largest_first(mut findings: Vec<(f64, Finding)>) -> Vec<Finding> {
+    findings.sort_by(|a, b| b.0.total_cmp(&a.0));
+    findings.into_iter().map(|(_, finding)| finding).collect()
+}
+
 /// A share in words: `12 %`, `0.034 %`.
 pub(super) fn percent(share: f64) -> String {
     let percent = 100.0 * share;

@@ -16,6 +16,9 @@ use crate::scene::Scene;
 /// of the hemisphere, and what is beyond it can hardly be seen.
 pub(super) const NEAR: f64 = 0.05;
 
+/// Reflections of a path that looks for light.
+const BOUNCES: usize = 8;
+
 /// Most faces that are passed in looking for one on the other side of a plate: more do not lie on
 /// each other in files that people make.
 const MOST_TWINS: usize = 8;
@@ -60,6 +63,9 @@ pub(super) struct Looker<'a> {
     scene: &'a Scene,
     parts: &'a Parts,
     reflects: &'a [bool],
+    exitance: &'a [f64],
+    /// Whether anything emits.
+    lit: bool,
     tree: RayTree,
     /// Rays begin so far above their surface: roundings of a point, metres.
     lift: f64,
@@ -68,14 +74,20 @@ pub(super) struct Looker<'a> {
 }
 
 impl<'a> Looker<'a> {
-    /// Prepares a scene; `reflects` tells which triangles reflect anything.
-    pub(super) fn new(scene: &'a Scene, parts: &'a Parts, reflects: &'a [bool]) -> Looker<'a> {
+    /// Prepares a scene; `reflects` tells which triangles reflect anything, `exitance` which emit.
+    pub(super) fn new(
+        scene: &'a Scene,
+        parts: &'a Parts,
+        reflects: &'a [bool],
+        exitance: &'a [f64],
+    ) -> Looker<'a> {
         let triangles: Vec<[DVec3; 3]> = scene.triangles.iter().map(|t| t.vertices).collect();
         let bounds = triangles.iter().fold(Bounds::EMPTY, |b, t| b.union(Bounds::of(t)));
         let magnitude = bounds.min.abs().max(bounds.max.abs()).max_element();
         let tree = RayTree::build(&triangles, |i, back| !back || is_two_sided(scene, i as u32));
         let (lift, contact) = (COINCIDENCE * magnitude, contact_distance(bounds));
-        Looker { scene, parts, reflects, tree, lift, contact }
+        let lit = exitance.iter().any(|&e| e > 0.0);
+        Looker { scene, parts, reflects, exitance, lit, tree, lift, contact }
     }
 
     /// What `rays` rays from each point meet.
@@ -138,6 +150,38 @@ impl<'a> Looker<'a> {
         met.sort_unstable();
         let same = met.chunk_by(|a, b| a == b);
         same.map(|same| Met { count: same.len() as u32, ..same[0] }).collect()
+    }
+
+    /// Whether path number `k` from a point, by its side or its back, comes to light of another part
+    /// within [`BOUNCES`] reflections; where nothing emits, out of the scene.
+    pub(super) fn comes_to_light(
+        &self,
+        point: &Point,
+        behind: bool,
+        k: u32,
+        stack: &mut Vec<(u32, f32)>,
+    ) -> bool {
+        let mut position = point.position;
+        let mut normal = if behind { -point.normal } else { point.normal };
+        for _ in 0..BOUNCES {
+            let origin = position + self.lift * normal;
+            let towards = direction(&Frame::new(position, normal), k, flips(position));
+            let Some(hit) = self.tree.nearest(origin, towards, 0.0, stack) else {
+                return !self.lit;
+            };
+            let triangle = hit.triangle as usize;
+            if self.is_black(hit) {
+                return false;
+            }
+            if self.exitance[triangle] > 0.0 && self.parts.of[triangle] != point.part {
+                return true;
+            }
+            let plane = Frame::of_triangle(&self.scene.triangles[triangle].vertices);
+            let Some(plane) = plane.filter(|_| self.reflects[triangle]) else { return false };
+            position = origin + hit.t * towards;
+            normal = if hit.back { -plane.n } else { plane.n };
+        }
+        false
     }
 
     fn is_black(&self, hit: RayHit) -> bool {

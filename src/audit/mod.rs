@@ -6,7 +6,7 @@
 //! | file | what is found |
 //! |---|---|
 //! | `closure` | does the scene let light out: everywhere (open), or through small gaps (leaks)? |
-//! | `sides` | objects whose backs face the rest of the scene; things inside of others |
+//! | `turned`, `buried` | objects whose backs face the rest of the scene; things inside of others |
 //! | `emitters` | scenes without light, lamps whose light goes nowhere |
 //! | `row_sums` | points that see more than the whole hemisphere: surfaces counted twice |
 //! | `reading` | what reading the file found, slivers, faces that nearly touch |
@@ -20,6 +20,7 @@
 //!
 //! Cost: about 2^21 rays, some seconds of exact row sums, and a mesh: O(n log n) for n triangles.
 
+mod buried;
 mod closure;
 mod emitters;
 mod finding;
@@ -28,7 +29,7 @@ mod parts;
 mod points;
 mod reading;
 mod row_sums;
-mod sides;
+mod turned;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -76,9 +77,10 @@ impl Audit {
 /// What the parts of the audit work with.
 struct Surveyed<'a> {
     scene: &'a Scene,
-    parts: Parts,
+    parts: &'a Parts,
     /// Mean exitance of each triangle, W/m^2: the largest channel.
-    exitance: Vec<f64>,
+    exitance: &'a [f64],
+    looker: &'a Looker<'a>,
     points: Vec<Point>,
     /// Rays from each point.
     rays: u32,
@@ -126,14 +128,23 @@ pub fn audit(scene: &Scene, notices: &[Notice], monitor: &Monitor) -> Result<Aud
     let parts = Parts::find(scene);
     let points = points::spread(scene, &parts, &exitance);
     let rays = points::rays_from_each(points.len());
-    let looks = Looker::new(scene, &parts, &reflects).look(&points, rays, monitor)?;
-    let survey = Surveyed { scene, parts, exitance, points, rays, looks };
+    let looker = Looker::new(scene, &parts, &reflects, &exitance);
+    let looks = looker.look(&points, rays, monitor)?;
+    let survey = Surveyed {
+        scene,
+        parts: &parts,
+        exitance: &exitance,
+        looker: &looker,
+        points,
+        rays,
+        looks,
+    };
 
     let mut findings = reading::of_notices(notices);
     findings.extend(reading::of_geometry(&survey));
-    let (turned, own) = sides::turned(&survey);
+    let (turned, own) = turned::find(&survey, monitor)?;
     findings.extend(own);
-    findings.extend(sides::buried(&survey, &turned));
+    findings.extend(buried::find(&survey, &turned));
     findings.extend(emitters::find(&survey, &turned, &reflects));
     let (closure, own) = closure::find(&survey, &turned);
     findings.extend(own);

@@ -10,7 +10,7 @@ use crate::scene::Scene;
 const POINTS: usize = 1024;
 
 /// Points that each part has at least, and each part that emits.
-const LEAST: usize = 1;
+const LEAST: usize = 4;
 const LEAST_THAT_EMIT: usize = 16;
 
 /// With more parts than this only objects are sure to have a point each; with more objects than this
@@ -64,44 +64,71 @@ pub(super) fn rays_from_each(points: usize) -> u32 {
 pub(super) fn spread(scene: &Scene, parts: &Parts, exitance: &[f64]) -> Vec<Point> {
     let by_part = parts.len() <= MOST_GROUPS;
     let by_object = scene.objects.len() <= MOST_GROUPS;
-    let mut sides = vec![];
-    for (i, triangle) in scene.triangles.iter().enumerate() {
+    let sides = sides(scene, |i| {
         let group = if by_part {
             parts.of[i]
         } else if by_object {
-            triangle.object
+            scene.triangles[i].object
         } else {
             0
         };
-        // The reader drops triangles without area.
-        let Some(frame) = Frame::of_triangle(&triangle.vertices) else { continue };
-        let (_, area) = triangle.normal_and_area();
-        let two_sided = scene.materials[triangle.material as usize].two_sided;
-        for back in [false, true].into_iter().take(1 + usize::from(two_sided)) {
-            let stratum = (group, exitance[i] > 0.0);
-            let normal = if back { -frame.n } else { frame.n };
-            sides.push(Side { stratum, triangle: i as u32, back, normal, area });
-        }
-    }
-    sides.sort_by_key(|side| (side.stratum, side.triangle, side.back));
+        Some((group, exitance[i] > 0.0))
+    });
     let total: f64 = sides.iter().map(|side| side.area).sum();
     let mut points = vec![];
     for group in sides.chunk_by(|a, b| a.stratum == b.stratum) {
         let area: f64 = group.iter().map(|side| side.area).sum();
         let least = if group[0].stratum.1 { LEAST_THAT_EMIT } else { LEAST };
         let count = ((POINTS as f64 * area / total) as usize).max(least);
-        let (mut before, mut made) = (0.0, 0);
-        for (k, side) in group.iter().enumerate() {
-            let after = if k + 1 == group.len() { f64::INFINITY } else { before + side.area };
-            while made < count && (made as f64 + 0.5) / count as f64 * area < after {
-                let own = area / count as f64;
-                points.push(point(scene, parts, side, points.len(), own));
-                made += 1;
-            }
-            before = after;
-        }
+        fill(scene, parts, group, count, &mut points);
     }
     points
+}
+
+/// `count` points on the one-sided triangles of each part that is `wanted`, in the order of parts.
+pub(super) fn on_parts(scene: &Scene, parts: &Parts, wanted: &[bool], count: usize) -> Vec<Point> {
+    let sides = sides(scene, |i| {
+        let two_sided = scene.materials[scene.triangles[i].material as usize].two_sided;
+        let part = parts.of[i];
+        (wanted[part as usize] && !two_sided).then_some((part, false))
+    });
+    let mut points = vec![];
+    for group in sides.chunk_by(|a, b| a.stratum == b.stratum) {
+        fill(scene, parts, group, count, &mut points);
+    }
+    points
+}
+
+/// Sides of the triangles that have a stratum, by strata.
+fn sides(scene: &Scene, stratum: impl Fn(usize) -> Option<(u32, bool)>) -> Vec<Side> {
+    let mut sides = vec![];
+    for (i, triangle) in scene.triangles.iter().enumerate() {
+        let Some(stratum) = stratum(i) else { continue };
+        // The reader drops triangles without area.
+        let Some(frame) = Frame::of_triangle(&triangle.vertices) else { continue };
+        let (_, area) = triangle.normal_and_area();
+        let two_sided = scene.materials[triangle.material as usize].two_sided;
+        for back in [false, true].into_iter().take(1 + usize::from(two_sided)) {
+            let normal = if back { -frame.n } else { frame.n };
+            sides.push(Side { stratum, triangle: i as u32, back, normal, area });
+        }
+    }
+    sides.sort_by_key(|side| (side.stratum, side.triangle, side.back));
+    sides
+}
+
+/// Adds `count` points, evenly by the area of some sides.
+fn fill(scene: &Scene, parts: &Parts, sides: &[Side], count: usize, points: &mut Vec<Point>) {
+    let area: f64 = sides.iter().map(|side| side.area).sum();
+    let (mut before, mut made) = (0.0, 0);
+    for (k, side) in sides.iter().enumerate() {
+        let after = if k + 1 == sides.len() { f64::INFINITY } else { before + side.area };
+        while made < count && (made as f64 + 0.5) / count as f64 * area < after {
+            points.push(point(scene, parts, side, points.len(), area / count as f64));
+            made += 1;
+        }
+        before = after;
+    }
 }
 
 /// Point `number` of all, on a side.

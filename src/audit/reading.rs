@@ -81,7 +81,7 @@ fn aspect([a, b, c]: &[DVec3; 3]) -> f64 {
 /// Faces of different parts that face each other within the contact distance, but farther apart than
 /// roundings of a file: how many pairs of objects have them, and the widest.
 fn gaps(survey: &Surveyed) -> Option<Finding> {
-    let parts = &survey.parts;
+    let parts = survey.parts;
     let (low, high) = survey.scene.bounds();
     let bounds = Bounds { min: low, max: high };
     // By pairs of objects: the largest gap and its place.
