@@ -29,6 +29,8 @@ struct Light {
     backs: BTreeMap<u32, f64>,
     /// On sides of other parts that are near, by object.
     near: BTreeMap<u32, f64>,
+    /// On backs of parts that are turned: that is said already.
+    turned_backs: f64,
     /// Out of the scene.
     escaped: f64,
     /// Whether some of it comes from parts that are turned: that is said already.
@@ -72,6 +74,18 @@ pub(super) fn find(survey: &Surveyed, turned: &[bool], reflects: &[bool]) -> Vec
     findings
 }
 
+/// Triangles that emit, of parts whose light falls on something that reflects.
+pub(super) fn bright(survey: &Surveyed) -> Vec<bool> {
+    let mut useful = vec![false; survey.parts.len()];
+    for (point, look) in survey.each() {
+        if survey.exitance[point.triangle as usize] > 0.0 {
+            useful[point.part as usize] |= look.count(|m| !m.black && m.reflects) > 0;
+        }
+    }
+    let of = |(&e, &part): (&f64, &u32)| e > 0.0 && useful[part as usize];
+    survey.exitance.iter().zip(&survey.parts.of).map(of).collect()
+}
+
 fn lights(survey: &Surveyed, turned: &[bool]) -> BTreeMap<u32, Light> {
     let parts = survey.parts;
     let mut lights: BTreeMap<u32, Light> = BTreeMap::new();
@@ -88,7 +102,9 @@ fn lights(survey: &Surveyed, turned: &[bool]) -> BTreeMap<u32, Light> {
         for m in &look.front {
             let own = power * survey.share(m.count);
             let object = parts.objects[m.part as usize];
-            if m.black && !turned[m.part as usize] {
+            if m.black && turned[m.part as usize] {
+                light.turned_backs += own;
+            } else if m.black {
                 *light.backs.entry(object).or_default() += own;
             } else if m.reflects {
                 light.useful += own;
@@ -102,10 +118,10 @@ fn lights(survey: &Surveyed, turned: &[bool]) -> BTreeMap<u32, Light> {
 }
 
 fn of_light(survey: &Surveyed, object: u32, light: &Light) -> Option<Finding> {
-    if light.turned {
+    let share = |power: f64| power / light.power;
+    if light.turned || share(light.turned_backs) > ON_BACKS {
         return None;
     }
-    let share = |power: f64| power / light.power;
     let sum = |by: &BTreeMap<u32, f64>| share(by.values().sum());
     let most = |by: &BTreeMap<u32, f64>| -> String {
         let most = by.iter().max_by(|a, b| a.1.total_cmp(b.1));
@@ -117,7 +133,7 @@ fn of_light(survey: &Surveyed, object: u32, light: &Light) -> Option<Finding> {
         Some(Finding { place: light.at, ..own })
     };
     if share(light.useful) < UNSEEN {
-        let black = 1.0 - share(light.useful) - backs - escaped;
+        let black = 1.0 - share(light.useful + light.turned_backs) - backs - escaped;
         let mut ways = vec![];
         if backs > UNSEEN {
             let on = most(&light.backs);

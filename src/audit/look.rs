@@ -63,9 +63,6 @@ pub(super) struct Looker<'a> {
     scene: &'a Scene,
     parts: &'a Parts,
     reflects: &'a [bool],
-    exitance: &'a [f64],
-    /// Whether anything emits.
-    lit: bool,
     tree: RayTree,
     /// Rays begin so far above their surface: roundings of a point, metres.
     lift: f64,
@@ -74,20 +71,14 @@ pub(super) struct Looker<'a> {
 }
 
 impl<'a> Looker<'a> {
-    /// Prepares a scene; `reflects` tells which triangles reflect anything, `exitance` which emit.
-    pub(super) fn new(
-        scene: &'a Scene,
-        parts: &'a Parts,
-        reflects: &'a [bool],
-        exitance: &'a [f64],
-    ) -> Looker<'a> {
+    /// Prepares a scene; `reflects` tells which triangles reflect anything.
+    pub(super) fn new(scene: &'a Scene, parts: &'a Parts, reflects: &'a [bool]) -> Looker<'a> {
         let triangles: Vec<[DVec3; 3]> = scene.triangles.iter().map(|t| t.vertices).collect();
         let bounds = triangles.iter().fold(Bounds::EMPTY, |b, t| b.union(Bounds::of(t)));
         let magnitude = bounds.min.abs().max(bounds.max.abs()).max_element();
         let tree = RayTree::build(&triangles, |i, back| !back || is_two_sided(scene, i as u32));
         let (lift, contact) = (COINCIDENCE * magnitude, contact_distance(bounds));
-        let lit = exitance.iter().any(|&e| e > 0.0);
-        Looker { scene, parts, reflects, exitance, lit, tree, lift, contact }
+        Looker { scene, parts, reflects, tree, lift, contact }
     }
 
     /// What `rays` rays from each point meet.
@@ -152,13 +143,14 @@ impl<'a> Looker<'a> {
         same.map(|same| Met { count: same.len() as u32, ..same[0] }).collect()
     }
 
-    /// Whether path number `k` from a point, by its side or its back, comes to light of another part
-    /// within [`BOUNCES`] reflections; where nothing emits, out of the scene.
+    /// Whether path number `k` from a point, by its side or its back, comes within [`BOUNCES`]
+    /// reflections to a triangle of another part that is `bright`; without any, out of the scene.
     pub(super) fn comes_to_light(
         &self,
         point: &Point,
         behind: bool,
         k: u32,
+        bright: Option<&[bool]>,
         stack: &mut Vec<(u32, f32)>,
     ) -> bool {
         let mut position = point.position;
@@ -167,13 +159,14 @@ impl<'a> Looker<'a> {
             let origin = position + self.lift * normal;
             let towards = direction(&Frame::new(position, normal), k, flips(position));
             let Some(hit) = self.tree.nearest(origin, towards, 0.0, stack) else {
-                return !self.lit;
+                return bright.is_none();
             };
             let triangle = hit.triangle as usize;
             if self.is_black(hit) {
                 return false;
             }
-            if self.exitance[triangle] > 0.0 && self.parts.of[triangle] != point.part {
+            let other = self.parts.of[triangle] != point.part;
+            if other && bright.is_some_and(|bright| bright[triangle]) {
                 return true;
             }
             let plane = Frame::of_triangle(&self.scene.triangles[triangle].vertices);

@@ -128,7 +128,7 @@ pub fn audit(scene: &Scene, notices: &[Notice], monitor: &Monitor) -> Result<Aud
     let parts = Parts::find(scene);
     let points = points::spread(scene, &parts, &exitance);
     let rays = points::rays_from_each(points.len());
-    let looker = Looker::new(scene, &parts, &reflects, &exitance);
+    let looker = Looker::new(scene, &parts, &reflects);
     let looks = looker.look(&points, rays, monitor)?;
     let survey = Surveyed {
         scene,

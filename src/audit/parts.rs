@@ -60,7 +60,9 @@ impl Parts {
     pub(super) fn of_objects(&self, objects: usize) -> Vec<Vec<usize>> {
         let mut members = vec![vec![]; objects];
         for (part, &object) in self.objects.iter().enumerate() {
-            members[object as usize].push(part);
+            if let Some(own) = members.get_mut(object as usize) {
+                own.push(part);
+            }
         }
         members
     }

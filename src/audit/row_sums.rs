@@ -28,10 +28,13 @@ const WORK: u64 = 3_000_000;
 /// Most points.
 const MOST_POINTS: usize = 256;
 
+/// With more faces than this even one point would take too long, and none is looked at.
+const MOST_FACES: usize = 150_000;
+
 /// Row sums at some points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowSums {
-    /// Points at which they were computed.
+    /// Points at which they were computed; none in scenes of very many faces.
     pub points: usize,
     /// Smallest and largest; 0 without points.
     pub least: f64,
@@ -51,7 +54,7 @@ pub(super) fn find(
     let occluders = Occluders::build(&triangles);
     let clusters = Clusters::build(&mesh);
     let stage = Stage { mesh: &mesh, clusters: &clusters, occluders: &occluders };
-    let order = order(survey);
+    let order = if mesh.faces.len() > MOST_FACES { vec![] } else { order(survey) };
     let sums = sums(survey, stage, &order, monitor)?;
     let all = || sums.iter().copied();
     let found = RowSums {

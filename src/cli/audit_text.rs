@@ -50,7 +50,7 @@ struct ClosureLine {
 /// Exact shares of the hemisphere that radiating sides fill: at most 1, and 1 in a closed scene.
 #[derive(Debug, Serialize)]
 struct RowSumsLine {
-    /// Points at which they were computed.
+    /// Points at which they were computed; none in scenes of very many faces.
     points: usize,
     least: f64,
     largest: f64,
@@ -138,6 +138,10 @@ impl AuditBlock {
                 sum(row_sums.least),
                 sum(row_sums.largest)
             ));
+        } else {
+            text.push_str(
+                "  no exact sums of rows: no point sees anything, or there are too many faces\n",
+            );
         }
         if self.objects_without_points > 0 {
             text.push_str(&format!(
