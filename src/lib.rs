@@ -7,12 +7,13 @@
 //!
 //! [`scene`] -> [`mesh`] -> [`cluster`] -> [`visibility`] -> [`kernel`] ->
 //! [`near`] | [`gray`] | [`far`] -> [`operator`] -> [`solve`] -> [`reconstruct`] -> [`output`] ->
-//! [`bake`] | [`render`] | [`probe`]
+//! [`bake`] | [`render`] | [`probe`] | [`audit`]
 //!
 //! "AC" in the documentation is K. Atkinson and D. Chien, "A study of the fast solution of the
 //! occluded radiosity equation" (2006), by its sections and equation numbers.
 #![forbid(unsafe_code)]
 
+pub mod audit;
 pub mod bake;
 pub mod cluster;
 pub mod error;

@@ -23,7 +23,7 @@ const ORDER: [&[&str]; 17] = [
     &["solve"],
     &["reconstruct"],
     &["output"],
-    &["bake", "render", "probe", "reference"],
+    &["bake", "render", "probe", "audit", "reference"],
     // Names that belong to no room come from lib.rs, where rooms must not look.
     &["lib"],
     &["cli"],

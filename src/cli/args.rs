@@ -73,7 +73,9 @@ Examples:
   lumel inspect cornell.gltf --reflectance 'white=0.9,0.9,0.9' --light-scale 2
       What changing materials would make of them.
   lumel inspect room.gltf --export room.json
-      Triangles, sides, light and view as they were read, for other programs.")]
+      Triangles, sides, light and view as they were read, for other programs.
+  lumel inspect room.gltf --audit
+      Also what is wrong with it: leaks, flipped and buried faces, lamps that nothing sees.")]
 pub struct InspectArgs {
     /// The scene and how to read it.
     #[command(flatten)]
@@ -81,6 +83,10 @@ pub struct InspectArgs {
     /// Print JSON instead of text
     #[arg(long, help_heading = None::<&str>)]
     pub json: bool,
+    /// Also look for mistakes in the scene: leaks, faces that are flipped, buried or counted twice,
+    /// lamps that nothing sees
+    #[arg(long, help_heading = None::<&str>)]
+    pub audit: bool,
     /// Also write the scene as it was read to this file as JSON: triangles in world space, their
     /// sides, reflectance and radiance (means where there are textures), and the view
     #[arg(long, value_name = "FILE", help_heading = None::<&str>)]

@@ -2,20 +2,25 @@
 
 use std::path::Path;
 
+use lumel::audit::Severity;
 use lumel::output::camera_matrices::CameraMatrices;
 use lumel::output::csv;
 use lumel::output::export::write_export;
 use lumel::output::picture::{Picture, Quantity, write_picture};
 use lumel::render::{self, RenderOptions};
-use lumel::{Error, Monitor, Result, probe, reference};
+use lumel::scene::Notice;
+use lumel::{Error, Monitor, Result, audit, probe, reference};
 
-use super::advice::advice_of_light;
+use super::advice::{advice, advice_of_light};
 use super::args::{Cli, Command};
+use super::audit_text::AuditBlock;
 use super::bake_settings::BakeSettings;
 use super::progress::Progress;
 use super::session::Session;
 use super::settings::{InspectSettings, ProbeSettings, ReferenceSettings, RenderSettings};
-use super::{bake, console, inspect, interrupt, outcome, reference_text, shell, sight, view};
+use super::{
+    audit_text, bake, console, inspect, interrupt, outcome, reference_text, shell, sight, view,
+};
 
 /// Does what was typed.
 pub fn run(cli: Cli) -> Result<()> {
@@ -47,7 +52,19 @@ fn inspect(settings: &InspectSettings) -> Result<()> {
     session.report.add_notices(blind.as_slice());
     scene.notices.extend(blind);
     let forecast = session.forecast(&scene, &settings.solve)?;
-    let description = session.clock.time("describe", || inspect::describe(&scene, &view, forecast));
+    let mut description =
+        session.clock.time("describe", || inspect::describe(&scene, &view, forecast));
+    if settings.audit {
+        // What is said about the scene as a whole the audit finds for itself.
+        let own = advice(&scene, settings.scene.options.light_scale);
+        let notices: Vec<Notice> =
+            scene.notices.iter().filter(|n| !own.contains(n)).cloned().collect();
+        let audit = session.clock.time("audit", || audit::audit(&scene, &notices, &monitor))?;
+        for severity in [Severity::Error, Severity::Warning, Severity::Note] {
+            session.report.count(audit_text::name(severity), audit.count(severity));
+        }
+        description.add_audit(AuditBlock::new(&audit));
+    }
     if let Some(path) = &settings.export {
         let size = (view.width, view.height);
         session.clock.time("write", || write_export(path, &scene, &view.camera, size))?;

@@ -4,11 +4,10 @@
 //! no failure. Errors and warnings go to standard error; when even that cannot be written there
 //! is nobody left to tell, and the exit code still says it.
 
-use std::collections::HashMap;
 use std::error::Error as _;
 use std::io::{self, Write};
 
-use lumel::scene::Notice;
+use lumel::scene::{Notice, group_notices};
 use lumel::{Error, Result};
 
 /// Writes a result to standard output.
@@ -35,37 +34,9 @@ pub fn print_error(error: &Error) {
 
 /// Writes what was odd in a scene to standard error, a line for each kind of oddity.
 pub fn print_warnings(notices: &[Notice]) {
-    let lines: String = grouped(notices).iter().map(|line| format!("Warning: {line}\n")).collect();
+    let lines: String =
+        group_notices(notices).iter().map(|n| format!("Warning: {}\n", line(n))).collect();
     let _ = io::stderr().write_all(lines.as_bytes());
-}
-
-/// Notices that say the same of several things, in one line that names the first of them.
-fn grouped(notices: &[Notice]) -> Vec<String> {
-    // The first notice with each text and how many further ones there are, in order; the map
-    // only finds the place.
-    let mut groups: Vec<(Notice, usize)> = Vec::new();
-    let mut places: HashMap<&str, usize> = HashMap::new();
-    for notice in notices {
-        match places.get(notice.text.as_str()) {
-            Some(&place) => {
-                groups[place].0.count += notice.count;
-                groups[place].1 += 1;
-            }
-            None => {
-                places.insert(&notice.text, groups.len());
-                groups.push((notice.clone(), 0));
-            }
-        }
-    }
-    groups
-        .into_iter()
-        .map(|(mut notice, others)| {
-            if others > 0 {
-                notice.about.push_str(&format!(" and {others} more"));
-            }
-            line(&notice)
-        })
-        .collect()
 }
 
 /// A notice in one line.
@@ -93,7 +64,7 @@ mod tests {
             notice("material \"c\"", "gloss is left out", 1),
         ];
         assert_eq!(
-            grouped(&notices),
+            group_notices(&notices).iter().map(line).collect::<Vec<_>>(),
             [
                 "material \"a\" and 2 more: gloss is left out (3 times)",
                 "mesh 2: lines are left out (7 times)",

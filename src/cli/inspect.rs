@@ -7,6 +7,7 @@ use lumel::bake::second_sets;
 use lumel::scene::{self, Camera, Projection, Scene};
 use serde::Serialize;
 
+use super::audit_text::AuditBlock;
 use super::console;
 use super::forecast::Forecast;
 use super::table::{Table, figure, figures};
@@ -33,6 +34,9 @@ pub struct Description {
     /// What solving it would take.
     forecast: Forecast,
     notices: Vec<NoticeLine>,
+    /// What an audit found, where one was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    audit: Option<AuditBlock>,
 }
 
 #[derive(Debug, Serialize)]
@@ -171,6 +175,7 @@ pub fn describe(scene: &Scene, view: &View, forecast: Forecast) -> Description {
                 line: console::line(notice),
             })
             .collect(),
+        audit: None,
     }
 }
 
@@ -222,6 +227,11 @@ fn camera_line((index, camera): (usize, &Camera)) -> CameraLine {
 }
 
 impl Description {
+    /// Adds what an audit found.
+    pub fn add_audit(&mut self, audit: AuditBlock) {
+        self.audit = Some(audit);
+    }
+
     /// For people.
     pub fn to_text(&self) -> String {
         let [low, high] = self.bounds;
@@ -253,7 +263,10 @@ impl Description {
         text.push_str(&self.emitters_text());
         text.push_str(&self.cameras_text());
         text.push_str(&self.coordinates_text());
-        if !self.notices.is_empty() {
+        // An audit has them among its findings.
+        if let Some(audit) = &self.audit {
+            text.push_str(&audit.to_text());
+        } else if !self.notices.is_empty() {
             text.push_str(&format!("\nnotices ({})\n", self.notices.len()));
             for notice in &self.notices {
                 text.push_str(&format!("  {}\n", notice.line));

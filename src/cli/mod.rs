@@ -6,6 +6,7 @@
 
 pub mod advice;
 pub mod args;
+pub mod audit_text;
 pub mod bake;
 pub mod bake_settings;
 pub mod commands;

@@ -131,6 +131,8 @@ pub struct InspectSettings {
     pub run: RunSettings,
     /// Whether to print JSON.
     pub json: bool,
+    /// Whether to look for mistakes in the scene.
+    pub audit: bool,
     /// Where to write the scene as it was read.
     pub export: Option<PathBuf>,
 }
@@ -182,6 +184,7 @@ impl InspectSettings {
             solve: solve(&args.solve)?,
             run: run(args.run),
             json: args.json,
+            audit: args.audit,
             export: args.export,
         })
     }

@@ -12,6 +12,7 @@
 //! | `uri` | files that a scene file refers to |
 //! | `overrides` | what the command line changes in materials |
 //! | `hygiene` | degenerate and duplicate triangles |
+//! | `winding`, `corners` | neighbours that disagree about their front; which triangles share corners |
 //! | `overlaps` | faces that overlap in one plane |
 //! | `texture`, `appearance` | images, and averages of what varies over a surface |
 //! | `camera`, `default_view` | views |
@@ -19,6 +20,7 @@
 
 mod appearance;
 mod camera;
+mod corners;
 mod default_view;
 mod gltf_accessor;
 mod gltf_buffers;
@@ -41,6 +43,7 @@ mod polygon;
 mod read;
 mod texture;
 mod uri;
+mod winding;
 
 use std::path::PathBuf;
 
@@ -48,12 +51,15 @@ use glam::{DVec2, DVec3};
 
 pub use appearance::{exitance, reflectance};
 pub use camera::{Camera, Projection, look_at};
+pub use corners::corner_numbers;
 pub use default_view::default_camera;
 pub use limits::MAX_REFLECTANCE;
+pub use notices::group_notices;
 pub use overlaps::{Overlaps, resolve as resolve_overlaps};
 pub use overrides::{Override, name_fits};
 pub use read::{ReadOptions, read};
 pub use texture::{Texture, TextureUse, Wrap};
+pub use winding::DISAGREES;
 
 /// A whole scene, in world space.
 #[derive(Clone, Debug, Default)]
@@ -76,6 +82,19 @@ pub struct Scene {
     pub notices: Vec<Notice>,
     /// What was done about faces that overlap in one plane.
     pub overlaps: Overlaps,
+    /// Objects whose faces do not agree about their front, in ascending order.
+    pub winding: Vec<Disagreement>,
+}
+
+/// An object with neighbouring one-sided triangles that have their fronts on different sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disagreement {
+    /// Index into [`Scene::objects`].
+    pub object: u32,
+    /// Edges across which it happens.
+    pub edges: usize,
+    /// The middle of one of them, metres.
+    pub at: DVec3,
 }
 
 /// A named part of a scene.

@@ -41,3 +41,32 @@ impl Notices {
         self.list
     }
 }
+
+/// Notices that say the same of several things as one, which names the first of them; in order.
+pub fn group_notices(notices: &[Notice]) -> Vec<Notice> {
+    // The first notice with each text and how many further ones there are; the map only finds the
+    // place.
+    let mut groups: Vec<(Notice, usize)> = Vec::new();
+    let mut places: HashMap<&str, usize> = HashMap::new();
+    for notice in notices {
+        match places.get(notice.text.as_str()) {
+            Some(&place) => {
+                groups[place].0.count += notice.count;
+                groups[place].1 += 1;
+            }
+            None => {
+                places.insert(&notice.text, groups.len());
+                groups.push((notice.clone(), 0));
+            }
+        }
+    }
+    groups
+        .into_iter()
+        .map(|(mut notice, others)| {
+            if others > 0 {
+                notice.about.push_str(&format!(" and {others} more"));
+            }
+            notice
+        })
+        .collect()
+}

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::overrides::{self, Override};
-use super::{Scene, gltf_file, hygiene, obj_file, overlaps, uri};
+use super::{Scene, gltf_file, hygiene, obj_file, overlaps, uri, winding};
 use crate::error::{Error, Result};
 
 /// What the user wants changed in a scene while it is read. The default changes nothing.
@@ -35,7 +35,8 @@ impl Default for ReadOptions {
 ///
 /// The bytes decide before the name does: what begins with `glTF` is read as GLB whatever it is
 /// called. Materials are then changed as `options` ask, degenerate and duplicate triangles are left
-/// out, and faces that overlap in one plane are cut; see [`Scene::notices`].
+/// out, neighbours that disagree about their front are counted, and faces that overlap in one plane
+/// are cut; see [`Scene::notices`].
 ///
 /// # Errors
 ///
@@ -64,6 +65,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Scene> {
     scene.files.insert(0, path.to_path_buf());
     overrides::apply(&mut scene, options)?;
     hygiene::clean(&mut scene)?;
+    winding::check(&mut scene);
     overlaps::resolve(&mut scene);
     Ok(scene)
 }
