@@ -97,7 +97,7 @@ fn pairs_of_points(scene: &Scene, light: &Light, data: &Value) -> Vec<Pair> {
     pairs
         .map(|((entry, point), (result, here))| Pair {
             name: format!("irradiance at {}", point.position),
-            ours: result.irradiance,
+            ours: result.irradiance.expect("there is time for all"),
             theirs: vector(&entry["irradiance"]),
             error: vector(&entry["standard_error"]),
             here,

@@ -459,7 +459,9 @@ fn what_does_not_overlap_is_unchanged() {
 #[test]
 fn shipped_scenes_have_no_overlaps() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    for name in ["cornell.gltf", "cornell.obj", "room.gltf", "paper.gltf", "furnace.gltf"] {
+    let names =
+        ["cornell.gltf", "cornell.obj", "room.gltf", "paper.gltf", "furnace.gltf", "arcade.gltf"];
+    for name in names {
         let scene = lumel::scene::read(&scenes.join(name), &Default::default()).unwrap();
         assert_eq!(scene.overlaps, Overlaps::default(), "{name}");
     }

@@ -75,6 +75,37 @@ fn coordinates_that_are_no_numbers() {
     refused("bad.obj", "v 1e200 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 3", Invalid, &["object", "1e30"]);
 }
 
+/// The crate that reads glTF cuts indices to 32 bits.
+#[test]
+fn indices_beyond_32_bits() {
+    let huge = 1u64 << 32;
+    let g = changed(|j| j["nodes"][0]["mesh"] = json!(huge));
+    refused_gltf(&g, Invalid, &["mesh", "4294967296", "export it again"]);
+    let g = changed(|j| j["accessors"][0]["componentType"] = json!(huge + 5126));
+    refused_gltf(&g, Invalid, &["componentType", "4294972422"]);
+    let g = changed(|j| j["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(huge));
+    refused_gltf(&g, Invalid, &["POSITION", "4294967296"]);
+}
+
+/// Found by a broken file: pi times the largest number is none.
+#[test]
+fn emission_beyond_reason() {
+    let face = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl Sun\nf 1 2 3\n";
+    for (emission, fits) in [("1e308", false), ("1e31", false), ("1e29", true)] {
+        let folder = Folder::new();
+        folder.write("m.mtl", format!("newmtl Sun\nKe {emission} 1 1\n"));
+        match folder.read("sun.obj", face) {
+            Ok(_) => assert!(fits, "{emission}"),
+            Err(error) => {
+                assert!(!fits && kind(&error) == Invalid, "{error}");
+                for part in ["sun.obj", "Sun", "1e30", "--emission"] {
+                    assert!(error.to_string().contains(part), "no \"{part}\" in: {error}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn transforms_that_are_no_transforms() {
     let huge = 1e300;

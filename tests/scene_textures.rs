@@ -162,6 +162,33 @@ fn coordinates_beyond_reason_end() {
 }
 
 /// A textured triangle in a GLB; coordinates (0,0), (1,0), (0,1).
+/// Coordinates that are far off, with differences that drown in their rounding, end too: found by a
+/// broken file whose texture is moved by 1e39.
+#[test]
+fn coordinates_far_from_the_image_end() {
+    let texture = || checkerboard(64, 2);
+    for offset in [1e9, 1e12, 1e20, 1e39, -1e300, f64::INFINITY] {
+        let mut s = scene(texture(), 1.0);
+        for uv in &mut s.triangles[0].uv[0] {
+            *uv += offset;
+        }
+        for size in [1.0, 1e-3, 1e6, 1e9] {
+            let part = [[0.2, 0.3, 0.5], [0.3, 0.3, 0.4], [0.2, 0.4, 0.4]].map(DVec3::from);
+            let middle = DVec3::splat(1.0 / 3.0);
+            let part = part.map(|b| middle + size * (b - middle));
+            let mean = reflectance(&s, 0, &part);
+            assert!(mean.min_element() >= 0.0 && mean.max_element() <= 0.999, "{offset}: {mean}");
+        }
+    }
+    // Where the texels can still be told apart, nothing changes.
+    let mut s = scene(texture(), 1.0);
+    let near = reflectance(&s, 0, &WHOLE).x;
+    for uv in &mut s.triangles[0].uv[0] {
+        *uv += 1e9;
+    }
+    assert!((reflectance(&s, 0, &WHOLE).x - near).abs() < 1e-3);
+}
+
 fn textured(image: &[u8], material: Value) -> Gltf {
     let mut g = Gltf::triangle();
     let uv = g.floats("VEC2", &[0., 0., 1., 0., 0., 1.]);

@@ -5,9 +5,10 @@
     tools/make_scenes.py --check     fail unless scenes/ holds just what would be written
     tools/make_scenes.py --closure   cast rays in the closed scenes: every one meets a front side
 
-The geometry is stated once, here, as planar faces with holes, and the files
-follow from it: the same bytes on every machine (only +, -, *, / and sqrt reach
-the files; angles are rounded). Lengths are metres, axes right-handed, faces
+The geometry is stated once, here (that of the arcade in make_arcade.py, which makes
+it in any size), as planar faces with holes, and the files follow from it: the same
+bytes on every machine (only +, -, *, / and sqrt reach the files; angles are
+rounded). Lengths are metres, axes right-handed, faces
 counter-clockwise about the side that radiates, emission is radiance in
 W/(m^2 sr), and colours are linear.
 
@@ -919,11 +920,13 @@ def obj(scene):
 
 
 def files():
-    """Every file's name and text."""
+    """Every file's name and bytes."""
+    from make_arcade import shipped  # not above: it imports this module
+
     box = cornell()
     out = {f"{s.name}.gltf": gltf(s) for s in (paper(), box, room(), furnace())}
     out["cornell.obj"], out["cornell.mtl"] = obj(box)
-    return out
+    return {**{name: text.encode("ascii") for name, text in out.items()}, **shipped()}
 
 
 def main():
@@ -939,9 +942,8 @@ def main():
         return 0
 
     stale = []
-    for name, text in files().items():
+    for name, data in files().items():
         path = SCENES / name
-        data = text.encode("ascii")
         if options.check:
             if not path.is_file() or path.read_bytes() != data:
                 stale.append(name)

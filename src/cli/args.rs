@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use glam::DVec3;
 use lumel::scene::Override;
 
@@ -11,15 +12,18 @@ use super::values::{self, MemorySize};
 
 /// Help that follows the list of commands.
 const AFTER_HELP: &str = "\
-Examples:
+Examples, on scenes that come with the program:
   lumel inspect room.gltf
       What is in the file: faces, materials, lamps, cameras, and what was odd.
-  lumel render room.gltf -o view.png --tolerance 0.3%
-      The view of the file's first camera, irradiance right to 0.3 % (root mean square).
+  lumel render room.gltf -o view.png
+      What the file's first camera sees; irradiance is right to 1 % (root mean square).
   lumel bake room.gltf -o baked.glb
       The scene with its light in lightmaps, for any viewer of glTF.
-  lumel probe room.obj --points desk.csv -o lux.csv --emission 'Lamp*=40,38,30'
-      Irradiance at given points, with the radiance of the lamps set by hand.
+  lumel probe cornell.obj --points desk.csv -o light.csv --emission 'li*=40,38,30'
+      Irradiance at given points, with the radiance of the lamp set by hand.
+
+More examples are in the help of each command, such as lumel render --help. The picture is black?
+lumel inspect says what a scene lacks and where its camera stands.
 
 Exit codes: 0 done, 1 failed at run time, 2 wrong usage, 3 bad scene or points,
 4 tolerance or time limit not met, 130 interrupted.";
@@ -52,6 +56,10 @@ pub enum Command {
     Probe(ProbeArgs),
     /// Repeat the experiments of Atkinson and Chien (2006), beside the printed tables
     Reference(ReferenceArgs),
+    /// Print a script that lets a shell complete this command line
+    Completions(CompletionsArgs),
+    /// Print the page of the manual of a command, for man
+    Manual(ManualArgs),
 }
 
 /// `lumel inspect`.
@@ -60,7 +68,10 @@ pub enum Command {
 Examples:
   lumel inspect room.gltf
   lumel inspect room.gltf --json | jq .materials
-  lumel inspect room.obj --eye 0,1.6,4 --look-at 0,1,0    checks a view before rendering it
+  lumel inspect cornell.obj --eye 0.278,0.273,-0.8 --look-at 0.278,0.273,0
+      Tells whether a view sees anything before it is drawn.
+  lumel inspect cornell.gltf --reflectance 'white=0.9,0.9,0.9' --light-scale 2
+      What changing materials would make of them.
   lumel inspect room.gltf --export room.json
       Triangles, sides, light and view as they were read, for other programs.
   lumel inspect room.gltf --audit
@@ -97,10 +108,14 @@ pub struct InspectArgs {
 Examples:
   lumel render room.gltf -o view.exr --tolerance 0.5%
       Linear radiance, in W/(m^2 sr), from the file's first camera.
-  lumel render room.gltf -o view.png --camera Desk --size 1920x1080 --exposure 1.5
-      One camera by its name, 1.5 stops brighter.
-  lumel render room.obj -o view.png --eye 0,1.6,4 --look-at 0,1,0 --fov 60
-      A view of one's own, for a file without cameras.")]
+  lumel render room.gltf -o view.png --camera table --size 1280x720 --samples 3 --exposure 1.5
+      One camera by its name, smooth edges, 1.5 stops brighter.
+  lumel render cornell.obj -o view.png --eye 0.278,0.273,-0.8 --look-at 0.278,0.273,0 --fov 39
+      A view of one's own, for a file without cameras.
+  lumel render room.gltf -o view.png --error-map error.exr --report report.json
+      With what is known of its errors.
+  lumel render room.gltf -o quick.png --size 320x240 --tolerance 5% --time-limit 60
+      A first look, in a minute at most.")]
 pub struct RenderArgs {
     /// The scene and how to read it.
     #[command(flatten)]
@@ -133,7 +148,7 @@ Examples:
       Shows its light in any viewer of glTF. Lightmap coordinates are TEXCOORD_1.
   lumel bake room.gltf -o baked.glb --target three --texels-per-metre 40 --tolerance 0.3%
       Keeps the materials; the lightmap holds irradiance, as three.js wants it.
-  lumel bake room.gltf -o baked.glb --only 'Wall*' --only Floor --density Floor=100
+  lumel bake room.gltf -o baked.glb --only 'wall*' --only floor --density floor=100
       Only some objects, lit by all; the floor finer than the rest.
   lumel bake room.gltf -o baked.glb --to vertices --max-triangles 20000
       Colours at vertices, on triangles as fine as the light asks for.")]
@@ -164,8 +179,9 @@ irradiance_r,irradiance_g,irradiance_b,radiosity_r,radiosity_g,radiosity_b in W/
 radiosity is empty where there is no surface.
 
 Examples:
-  lumel probe room.gltf --points desk.csv -o light.csv --tolerance 0.1%
-  printf 'x,y,z,nx,ny,nz\\n0,0.75,0,0,1,0\\n' > p.csv && lumel probe room.gltf --points p.csv")]
+  lumel probe cornell.gltf --points desk.csv -o light.csv --tolerance 0.1%
+  printf 'x,y,z,nx,ny,nz\\n0.3,0,0.2,0,1,0\\n' > p.csv && lumel probe furnace.gltf --points p.csv
+      A table of one point, made by hand.")]
 pub struct ProbeArgs {
     /// The scene and how to read it.
     #[command(flatten)]
@@ -191,9 +207,11 @@ The surface, the solutions and the tables are those of K. Atkinson and D. Chien,
 fast solution of the occluded radiosity equation, 2006, sections 5 and 6. Times are CPU seconds.
 
 Examples:
-  lumel reference                                   all tables up to n = 2560, in seconds
+  lumel reference
+      All tables up to n = 2560, in seconds.
   lumel reference --table 6.5 --table 6.10 --max-n 40960
-  lumel reference --max-n 163840 --json > tables.jsonl")]
+  lumel reference --max-n 163840 --json > tables.jsonl
+      All there is, in a quarter of an hour.")]
 pub struct ReferenceArgs {
     /// Table to compute, 6.1 to 6.11; may be repeated [default: all]
     #[arg(long = "table", value_name = "NUMBER", help_heading = None::<&str>)]
@@ -210,6 +228,30 @@ pub struct ReferenceArgs {
     /// How to run.
     #[command(flatten)]
     pub run: RunArgs,
+}
+
+/// `lumel completions`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  lumel completions bash > ~/.local/share/bash-completion/completions/lumel
+  lumel completions zsh > ~/.zfunc/_lumel
+      With fpath+=~/.zfunc before compinit in .zshrc.
+  lumel completions fish > ~/.config/fish/completions/lumel.fish")]
+pub struct CompletionsArgs {
+    /// The shell
+    pub shell: Shell,
+}
+
+/// `lumel manual`.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  lumel manual | man -l -
+  lumel manual bake > ~/.local/share/man/man1/lumel-bake.1")]
+pub struct ManualArgs {
+    /// The command [default: the program as a whole]
+    pub command: Option<String>,
 }
 
 /// The scene and how to read it.
@@ -408,11 +450,13 @@ pub struct SolveArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Run")]
 pub struct RunArgs {
-    /// Give up after this many seconds (exit code 4)
+    /// Refine no further after this many seconds: the best light so far is written (exit code 4 if
+    /// it is not what was asked for). Writing may take half as long again; pictures and lightmaps
+    /// that would take longer are coarse
     #[arg(long, value_name = "SECONDS", value_parser = values::positive, allow_negative_numbers = true)]
     pub time_limit: Option<f64>,
     /// Threads to use [default: one for each processor]; results do not depend on it
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::threads)]
     pub threads: Option<NonZeroUsize>,
     /// Write neither warnings nor progress
     #[arg(short, long)]

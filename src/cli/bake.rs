@@ -9,14 +9,14 @@ use lumel::output::atomic::{check_writable, write_together};
 use lumel::reconstruct::irradiance::IrradianceCounts;
 use lumel::scene::{Notice, Scene};
 use lumel::solve::Light;
-use lumel::{Monitor, Result};
+use lumel::{Error, Monitor, Result};
 
+use super::advice::advice_of_light;
 use super::args::ToArg;
 use super::bake_settings::BakeSettings;
-use super::commands::{for_output, met};
 use super::progress::Progress;
 use super::session::Session;
-use super::{console, interrupt};
+use super::{console, interrupt, outcome};
 
 /// Error of light between vertices where the solution was not made to a tolerance.
 const USUAL_ERROR: f64 = 0.01;
@@ -30,7 +30,7 @@ pub fn bake(settings: &BakeSettings) -> Result<()> {
     let outputs: Vec<&Path> = names.iter().map(|name| name.as_path()).collect();
     let mut session =
         Session::begin("bake", path, &[], &outputs, settings.described(), &settings.run)?;
-    let progress = Progress::new(settings.run.quiet);
+    let progress = Progress::new(settings.run.quiet, settings.run.time_limit);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
     let warn = |notices: &[Notice]| {
@@ -52,27 +52,46 @@ pub fn bake(settings: &BakeSettings) -> Result<()> {
         warn(&atlas.notices);
     }
     let light = session.light(&scene, &settings.solve, &monitor)?;
-    let monitor = for_output(monitor, &light, &tell);
-    let (files, counts) = match &atlas {
-        Some(atlas) => to_lightmaps(settings, &scene, &light, atlas, &mut session, &monitor)?,
-        None => to_vertices(settings, &scene, &light, &wanted, &mut session, &monitor)?,
+    progress.clear();
+    session.warn(&advice_of_light(&scene, &light));
+    let monitor = outcome::for_output(monitor, &tell);
+    // What it takes from now on does not depend on how fine it is by much.
+    let last = outcome::without_limit(&tell);
+    let bake = |settings, atlas: Option<&Atlas>, session: &mut Session, monitor| match atlas {
+        Some(atlas) => to_lightmaps(settings, &scene, &light, atlas, session, (monitor, &last)),
+        None => to_vertices(settings, &scene, &light, &wanted, session, monitor),
+    };
+    let baked = bake(settings, atlas.as_ref(), &mut session, &monitor);
+    let hurried = matches!(baked, Err(Error::TimeLimit(_)));
+    let (files, counts) = match (hurried, &atlas) {
+        (false, _) => baked?,
+        (true, None) => bake(&settings.coarse(1), None, &mut session, &last)?,
+        (true, Some(_)) => {
+            let (coarse, atlas) = coarse_atlas(settings, &scene, &mut session)?;
+            bake(&coarse, Some(&atlas), &mut session, &last)?
+        }
     };
     warn(&files.notices);
     session.report.add_notices(&files.notices);
     if let Some(ev) = files.exposure_ev {
         session.report.value("exposure", ev);
     }
-    session.clock.time("write", || write_together(&files.list, || monitor.check()))?;
+    session.clock.time("write", || write_together(&files.list, || last.check()))?;
     progress.clear();
     session.finish()?;
-    met(&light, filled(&light, &counts))
+    let what = match settings.to {
+        ToArg::Lightmap => "lightmaps are coarse, with down to an eighth of the texels each way",
+        ToArg::Vertices => "triangles were not refined",
+    };
+    outcome::met(&light, filled(&light, &counts), hurried.then_some(what))
 }
 
 /// The layout of lightmaps; also makes sure that all of them can be written.
 fn atlas(settings: &BakeSettings, scene: &Scene, session: &mut Session) -> Result<Atlas> {
     let atlas = session.clock.time("atlas", || make_atlas(scene, &settings.atlas))?;
+    let inputs: Vec<&Path> = scene.files.iter().map(|file| file.as_path()).collect();
     for name in files::names(&settings.output, atlas.pages.len(), settings.format)? {
-        check_writable(&name, &[&settings.scene.path])?;
+        check_writable(&name, &inputs)?;
     }
     session.report.count("pages", atlas.pages.len());
     session.report.count("charts", atlas.charts.len());
@@ -81,13 +100,29 @@ fn atlas(settings: &BakeSettings, scene: &Scene, session: &mut Session) -> Resul
     Ok(atlas)
 }
 
+/// A layout with an eighth of the texels in each direction, or as few as all charts fit on.
+fn coarse_atlas(
+    settings: &BakeSettings,
+    scene: &Scene,
+    session: &mut Session,
+) -> Result<(BakeSettings, Atlas)> {
+    let mut coarser = outcome::COARSER;
+    loop {
+        let coarse = settings.coarse(coarser);
+        match atlas(&coarse, scene, session) {
+            Err(Error::Usage(_)) if coarser > 1 => coarser /= 2,
+            made => return made.map(|atlas| (coarse, atlas)),
+        }
+    }
+}
+
 fn to_lightmaps(
     settings: &BakeSettings,
     scene: &Scene,
     light: &Light,
     atlas: &Atlas,
     session: &mut Session,
-    monitor: &Monitor,
+    (monitor, last): (&Monitor, &Monitor),
 ) -> Result<(Files, IrradianceCounts)> {
     let (maps, counts) = session.clock.time("bake", || {
         bake_lightmaps(scene, light, atlas, &LightmapOptions::default(), monitor)
@@ -99,7 +134,7 @@ fn to_lightmaps(
     session.report.count("parts of faces buried", counts.buried as usize);
     let options = file_options(settings, error(light, filled(light, &counts.irradiance)));
     let mut files = session.clock.time("encode", || {
-        files::lightmap_files(scene, atlas, &maps, &settings.output, &options, monitor)
+        files::lightmap_files(scene, atlas, &maps, &settings.output, &options, last)
     })?;
     files.notices.splice(0..0, counts.notices);
     Ok((files, counts.irradiance))

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lumel::bake::atlas::{AtlasOptions, Density};
+use lumel::bake::atlas::{AtlasOptions, DEFAULT_SIZE, Density};
 use lumel::bake::files::{self, Format};
 use lumel::bake::target::Target;
 use lumel::{Error, Result};
@@ -11,6 +11,9 @@ use super::args::{BakeArgs, FormatArg, TargetArg, ToArg};
 use super::settings::{
     Described, RunSettings, SceneSettings, SolveSettings, pair, run, scene, solve,
 };
+
+/// Sides of pages are not made smaller than this.
+const LEAST_SIZE: u32 = 16;
 
 /// `lumel bake`.
 #[derive(Clone, Debug)]
@@ -111,6 +114,26 @@ impl BakeSettings {
         })
     }
 
+    /// The same with fewer texels, by this factor in each direction, or triangles as they are.
+    pub fn coarse(&self, coarser: u32) -> BakeSettings {
+        let mut coarse = self.clone();
+        let atlas = &mut coarse.atlas;
+        match &mut atlas.texels_per_metre {
+            // Densities of some objects are absolute beside it, and relative without it.
+            Some(texels) => {
+                let coarser = f64::from(coarser);
+                *texels /= coarser;
+                atlas.densities.iter_mut().for_each(|d| d.texels_per_metre /= coarser);
+            }
+            None => {
+                let size = atlas.size.unwrap_or(DEFAULT_SIZE).min(atlas.max_size);
+                atlas.size = Some((size / coarser).max(LEAST_SIZE.min(size)));
+            }
+        }
+        coarse.most_triangles = 0;
+        coarse
+    }
+
     /// For the files.
     pub fn metadata(&self) -> Described {
         let mut list = self.scene.metadata();
@@ -182,6 +205,19 @@ mod tests {
         let good = bake("-o a.GLB --target bevy --half --layers --density F=3 --size 64").unwrap();
         assert_eq!((good.target, good.format), (Target::Bevy, Format::Exr { half: true }));
         assert_eq!(good.atlas.densities[0].texels_per_metre, 3.0);
+    }
+
+    #[test]
+    fn coarse_settings_have_an_eighth_of_the_texels_each_way() {
+        let coarse = |typed: &str| bake(&format!("-o a.glb {typed}")).unwrap().coarse(8).atlas;
+        assert_eq!(coarse("--size 8").size, Some(8));
+        assert_eq!(coarse("").size, Some(128));
+        assert_eq!(coarse("--size 512").size, Some(64));
+        assert_eq!(coarse("--size 20 --density F=3").size, Some(16));
+        let dense = coarse("--texels-per-metre 80 --density F=16");
+        assert_eq!((dense.texels_per_metre, dense.size), (Some(10.0), None));
+        assert_eq!(dense.densities[0].texels_per_metre, 2.0);
+        assert_eq!(coarse("--density F=16").densities[0].texels_per_metre, 16.0);
     }
 
     #[test]

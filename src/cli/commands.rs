@@ -9,17 +9,18 @@ use lumel::output::export::write_export;
 use lumel::output::picture::{Picture, Quantity, write_picture};
 use lumel::render::{self, RenderOptions};
 use lumel::scene::Notice;
-use lumel::solve::Light;
 use lumel::{Error, Monitor, Result, audit, probe, reference};
 
-use super::advice::advice;
+use super::advice::{advice_of_light, darkness};
 use super::args::{Cli, Command};
 use super::audit_text::AuditBlock;
 use super::bake_settings::BakeSettings;
 use super::progress::Progress;
 use super::session::Session;
 use super::settings::{InspectSettings, ProbeSettings, ReferenceSettings, RenderSettings};
-use super::{audit_text, bake, console, inspect, interrupt, reference_text, view};
+use super::{
+    audit_text, bake, console, inspect, interrupt, outcome, reference_text, shell, sight, view,
+};
 
 /// Does what was typed.
 pub fn run(cli: Cli) -> Result<()> {
@@ -30,6 +31,8 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Bake(args) => bake::bake(&BakeSettings::new(args)?),
         Command::Probe(args) => probe(&ProbeSettings::new(args)?),
         Command::Reference(args) => tables(&ReferenceSettings::new(args)),
+        Command::Completions(args) => console::print(&shell::completions(args.shell)),
+        Command::Manual(args) => console::print(&shell::manual(args.command.as_deref())?),
     }
 }
 
@@ -38,18 +41,22 @@ fn inspect(settings: &InspectSettings) -> Result<()> {
     let outputs: Vec<&Path> = settings.export.as_deref().into_iter().collect();
     let mut session =
         Session::begin("inspect", path, &[], &outputs, settings.described(), &settings.run)?;
-    let progress = Progress::new(settings.run.quiet);
+    let progress = Progress::new(settings.run.quiet, settings.run.time_limit);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
 
-    let scene = session.read(&settings.scene, &monitor)?;
+    let mut scene = session.read(&settings.scene, &monitor)?;
     let view = view::choose(&scene, &settings.view)?;
+    // Shown with what else is odd about the scene.
+    let blind = sight::advice(&scene, &view);
+    session.report.add_notices(blind.as_slice());
+    scene.notices.extend(blind);
     let forecast = session.forecast(&scene, &settings.solve)?;
     let mut description =
         session.clock.time("describe", || inspect::describe(&scene, &view, forecast));
     if settings.audit {
-        // What is said about the scene as a whole the audit finds for itself.
-        let own = advice(&scene, settings.scene.options.light_scale);
+        // That there is no light the audit finds for itself.
+        let own = darkness(&scene, settings.scene.options.light_scale);
         let notices: Vec<Notice> =
             scene.notices.iter().filter(|n| !own.contains(n)).cloned().collect();
         let audit = session.clock.time("audit", || audit::audit(&scene, &notices, &monitor))?;
@@ -79,7 +86,7 @@ fn render(settings: &RenderSettings) -> Result<()> {
     let outputs: Vec<&Path> = [output].into_iter().chain(settings.error_map.as_deref()).collect();
     let mut session =
         Session::begin("render", path, &[], &outputs, settings.described(), &settings.run)?;
-    let progress = Progress::new(settings.run.quiet);
+    let progress = Progress::new(settings.run.quiet, settings.run.time_limit);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
 
@@ -89,17 +96,23 @@ fn render(settings: &RenderSettings) -> Result<()> {
         console::print_warnings(&scene.notices);
     }
     let view = view::choose(&scene, &settings.view)?;
+    session.warn(sight::advice(&scene, &view).as_slice());
     let light = session.light(&scene, &settings.solve, &monitor)?;
-    let monitor = for_output(monitor, &light, &tell);
+    progress.clear();
+    session.warn(&advice_of_light(&scene, &light));
+    let monitor = outcome::for_output(monitor, &tell);
     let options = RenderOptions {
         width: view.width,
         height: view.height,
         samples: settings.samples,
         gather: settings.gather,
     };
-    let (pixels, gathered) = session
-        .clock
-        .time("render", || render::render(&scene, &light, &view.camera, &options, &monitor))?;
+    let (pixels, gathered, hurried) = session.clock.time("render", || {
+        outcome::drawn(&options, &monitor, &tell, |options, monitor| {
+            render::render(&scene, &light, &view.camera, options, monitor)
+        })
+    })?;
+    let hurried = hurried.then_some("the picture is coarse, with an eighth of the pixels each way");
     session.gathered(&light, &gathered);
     let mut metadata = settings.metadata();
     metadata.push(("view".into(), view.camera.name.clone()));
@@ -108,6 +121,7 @@ fn render(settings: &RenderSettings) -> Result<()> {
         metadata.push(("estimated error".into(), format!("{error:.2e}")));
         metadata.extend(source.shortfall.iter().map(|why| ("shortfall".into(), why.clone())));
     }
+    metadata.extend(hurried.map(|what| ("hurried".into(), what.into())));
     let aspect = f64::from(view.width) / f64::from(view.height);
     let picture = Picture {
         width: view.width,
@@ -119,8 +133,11 @@ fn render(settings: &RenderSettings) -> Result<()> {
     };
     session.clock.time("write", || write_picture(output, &picture, &settings.picture))?;
     if let Some(path) = &settings.error_map {
-        let pixels = session.clock.time("error map", || {
-            render::error_map(&scene, &light, &view.camera, &options, &monitor)
+        let (pixels, ..) = session.clock.time("error map", || {
+            outcome::drawn(&options, &monitor, &tell, |options, monitor| {
+                let map = render::error_map(&scene, &light, &view.camera, options, monitor);
+                map.map(|pixels| (pixels, ()))
+            })
         })?;
         let map = Picture { pixels, quantity: Quantity::RelativeError, ..picture };
         session.clock.time("write", || write_picture(path, &map, &settings.picture))?;
@@ -128,7 +145,7 @@ fn render(settings: &RenderSettings) -> Result<()> {
     progress.clear();
     session.finish()?;
     let filled = light.apart().map_or(0.0, |source| gathered.error(source.estimate.mean));
-    met(&light, filled)
+    outcome::met(&light, filled, hurried)
 }
 
 fn probe(settings: &ProbeSettings) -> Result<()> {
@@ -138,7 +155,7 @@ fn probe(settings: &ProbeSettings) -> Result<()> {
     let outputs: Vec<&Path> = output.into_iter().collect();
     let mut session =
         Session::begin("probe", path, &inputs, &outputs, settings.described(), &settings.run)?;
-    let progress = Progress::new(settings.run.quiet);
+    let progress = Progress::new(settings.run.quiet, settings.run.time_limit);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
 
@@ -151,58 +168,31 @@ fn probe(settings: &ProbeSettings) -> Result<()> {
         console::print_warnings(&scene.notices);
     }
     let light = session.light(&scene, &settings.solve, &monitor)?;
-    let monitor = for_output(monitor, &light, &tell);
+    progress.clear();
+    session.warn(&advice_of_light(&scene, &light));
+    let monitor = outcome::for_output(monitor, &tell);
     let results =
         session.clock.time("probe", || probe::probe(&scene, &light, &points, &monitor))?;
     progress.clear();
+    let unknown = results.iter().filter(|result| result.irradiance.is_none()).count();
+    session.report.count("points without values", unknown);
+    if unknown > 0 && unknown == points.len() {
+        monitor.check()?;
+    }
     match output {
         Some(path) => csv::write_results(path, &points, &results)?,
         None => console::print(&csv::format_results(&points, &results))?,
     }
     session.finish()?;
-    met(&light, 0.0)
-}
-
-/// What watches over the making of the output: when time ran out, the best result is still written.
-pub fn for_output<'a>(
-    monitor: Monitor<'a>,
-    light: &Light,
-    tell: &'a (dyn Fn(&'static str, u64, u64) + Sync),
-) -> Monitor<'a> {
-    let late = light.apart().is_some_and(|source| source.out_of_time);
-    if late { Monitor::new(interrupt::flag(), None, tell) } else { monitor }
-}
-
-/// Whether the light is as good as was asked for, with errors of `filled` from filling in.
-pub fn met(light: &Light, filled: f64) -> Result<()> {
-    let Some(source) = light.apart() else { return Ok(()) };
-    let error = source.estimate.rms.hypot(filled);
-    let why = match &source.shortfall {
-        Some(why) => why.as_str(),
-        None if error > source.tolerance => "of what was filled in, or the range of its channels",
-        None => return Ok(()),
-    };
-    Err(Error::ToleranceNotMet(format!(
-        "the tolerance of {} was not met: {why}. What was written has an estimated error of {} (root \
-         mean square, relative to the mean irradiance)",
-        percent(source.tolerance),
-        percent(error)
-    )))
-}
-
-fn percent(share: f64) -> String {
-    let rounded = format!("{:.1e}", 100.0 * share).parse::<f64>();
-    match rounded {
-        Ok(percent) if percent.is_finite() => format!("{percent} %"),
-        _ => "unknown size".into(),
-    }
+    let hurried = format!("{unknown} of {} points have no values", points.len());
+    outcome::met(&light, 0.0, (unknown > 0).then_some(hurried.as_str()))
 }
 
 fn tables(settings: &ReferenceSettings) -> Result<()> {
     let paper = Path::new("Atkinson and Chien 2006");
     let mut session =
         Session::begin("reference", paper, &[], &[], settings.described(), &settings.run)?;
-    let progress = Progress::new(settings.run.quiet);
+    let progress = Progress::new(settings.run.quiet, settings.run.time_limit);
     let tell = |stage, done, total| progress.hear(stage, done, total);
     let monitor = Monitor::new(interrupt::flag(), settings.run.time_limit, &tell);
     // JSON lines go out as they are found: a long run shows what it has.

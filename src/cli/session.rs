@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use lumel::output::atomic::{check_writable, same_file};
 use lumel::output::report::{Report, StageClock};
 use lumel::reconstruct::irradiance::IrradianceCounts;
-use lumel::scene::{self, Scene};
+use lumel::scene::{self, Notice, Scene};
 use lumel::solve::light::{self, Light};
 use lumel::solve::{WithinOptions, light_within};
 use lumel::{Error, Monitor, Result};
 
 use super::advice::advice;
+use super::console;
 use super::forecast::Forecast;
 use super::settings::{Described, RunSettings, SceneSettings, SolveSettings};
 
@@ -22,6 +23,9 @@ pub struct Session {
     /// What is known about the run so far; stages are added at the end.
     pub report: Report,
     report_path: Option<PathBuf>,
+    /// All files that will be written, as far as they are known at the beginning.
+    targets: Vec<PathBuf>,
+    quiet: bool,
 }
 
 impl Session {
@@ -56,7 +60,21 @@ impl Session {
         }
         let mut report = Report::new(command, scene);
         report.settings = settings.into_iter().collect();
-        Ok(Session { clock: StageClock::new(), report, report_path: run.report.clone() })
+        Ok(Session {
+            clock: StageClock::new(),
+            report,
+            targets: targets.into_iter().map(Path::to_path_buf).collect(),
+            report_path: run.report.clone(),
+            quiet: run.quiet,
+        })
+    }
+
+    /// Notes what was odd, and says it unless that is unwanted.
+    pub fn warn(&mut self, notices: &[Notice]) {
+        self.report.add_notices(notices);
+        if !self.quiet {
+            console::print_warnings(notices);
+        }
     }
 
     /// Reads the scene and notes what was found, and what it lacks.
@@ -64,6 +82,9 @@ impl Session {
         let stage = monitor.stage("read", 1);
         let mut scene =
             self.clock.time("read", || scene::read(&settings.path, &settings.options))?;
+        // Which files are its buffers, images and materials is known only now.
+        let files: Vec<&Path> = scene.files.iter().map(PathBuf::as_path).collect();
+        self.targets.iter().try_for_each(|target| check_writable(target, &files))?;
         // What concerns the whole scene comes first.
         scene.notices.splice(0..0, advice(&scene, settings.options.light_scale));
         stage.advance(1)?;
@@ -109,6 +130,10 @@ impl Session {
             report.value("estimated error rms", estimate.rms);
             report.value("estimated error maximum", estimate.maximum);
             report.channels("mean irradiance", estimate.mean.to_array());
+            if let Some(rays) = &source.rays {
+                report.value("share of irradiance that rays estimate", rays.share);
+                report.value("estimated error of rays rms", rays.error);
+            }
         }
         let contacts = light.mesh.contacts;
         report.count("faces cut at contacts", contacts.cut);

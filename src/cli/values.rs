@@ -2,6 +2,8 @@
 //!
 //! Each message says what is expected, with an example; clap adds what was typed and where.
 
+use std::num::NonZeroUsize;
+
 use glam::DVec3;
 
 /// Largest width or height of a picture, pixels: what every format holds and most viewers show.
@@ -9,6 +11,10 @@ const LARGEST_SIDE: u32 = 32_768;
 
 /// Most levels of uniform refinement: 4^15 is a thousand million elements for each face.
 const MOST_LEVELS: u32 = 15;
+
+/// Most threads: more than the processors of any machine, and few enough that a mistyped number
+/// does not stop it.
+const MOST_THREADS: usize = 1024;
 
 /// A limit of memory, as typed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +75,14 @@ pub fn exposure(text: &str) -> Result<f64, String> {
     match number(text)? {
         v if v.abs() <= 100.0 => Ok(v),
         _ => Err("expected stops between -100 and 100, such as 1.5 or -2".into()),
+    }
+}
+
+/// A number of threads.
+pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    match text.trim().parse::<NonZeroUsize>() {
+        Ok(v) if v.get() <= MOST_THREADS => Ok(v),
+        _ => Err(format!("expected a number of threads from 1 to {MOST_THREADS}, such as 4")),
     }
 }
 
@@ -208,6 +222,8 @@ mod tests {
         assert_eq!(residual("1e-8"), Ok(1e-8));
         assert!(residual("1").is_err() && residual("0").is_err());
         assert!(field_of_view("180").is_err() && field_of_view("39.6").is_ok());
+        assert_eq!(threads("1024").map(usize::from), Ok(1024));
+        assert!(threads("0").is_err() && threads("1025").is_err() && threads("-1").is_err());
         assert_eq!(exposure("-2"), Ok(-2.0));
         assert!(exposure("1e3").is_err());
         assert_eq!(levels("15"), Ok(15));

@@ -1,33 +1,26 @@
 //! A bounding volume hierarchy that proposes candidates; f64 geometry elsewhere decides.
 //!
 //! Built by `obvhs` (PLOC with reinsertion) over boxes in f32, rounded outward, of coordinates
-//! scaled to the unit cube: no scene is too small, too large or too far away for f32 boxes. What a
+//! scaled to the unit cube: no scene is too small, too large or too far away for f32 boxes. Boxes that
+//! lie inside of each other by the thousand, which take `obvhs` minutes, have a builder of their own. What a
 //! query proposes is a superset of what is asked for; its order depends on the shape of the tree,
 //! so callers that need an order must sort.
 
 use std::time::Duration;
 
 use glam::{DVec3, Vec3};
+use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
-use obvhs::{Boundable, BvhBuildParams};
 
-use super::Bounds;
+use super::{Bounds, nested};
 
 /// A hierarchy over a list of boxes.
 pub struct BoxTree {
     pub(super) tree: Bvh2,
     pub(super) centre: DVec3,
     pub(super) scale: f64,
-}
-
-struct Proposed(Aabb);
-
-impl Boundable for Proposed {
-    fn aabb(&self) -> Aabb {
-        self.0
-    }
 }
 
 impl BoxTree {
@@ -41,15 +34,17 @@ impl BoxTree {
         };
         let down = |x: DVec3| x.as_vec3().to_array().map(|c| c.next_down().next_down());
         let up = |x: DVec3| x.as_vec3().to_array().map(|c| c.next_up().next_up());
-        let proposed: Vec<Proposed> = boxes
+        let proposed: Vec<Aabb> = boxes
             .iter()
             .map(|b| {
                 let (min, max) = ((b.min - centre) / scale, (b.max - centre) / scale);
-                Proposed(Aabb::new(Vec3::from(down(min)).into(), Vec3::from(up(max)).into()))
+                Aabb::new(Vec3::from(down(min)).into(), Vec3::from(up(max)).into())
             })
             .collect();
         let tree = if proposed.is_empty() {
             Bvh2::default()
+        } else if nested::merges_slowly(&proposed) {
+            nested::halved(&proposed)
         } else {
             build_bvh2(&proposed, BvhBuildParams::medium_build(), &mut Duration::default())
         };

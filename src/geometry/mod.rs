@@ -6,6 +6,7 @@ pub mod circle;
 pub mod contact;
 pub mod convex;
 pub mod frame;
+mod nested;
 pub mod polygon;
 pub mod ray;
 pub mod ray_tree;
@@ -14,7 +15,7 @@ pub use bounds::Bounds;
 pub use box_tree::BoxTree;
 pub use contact::{CONTACT, contact_distance, file_rounding};
 pub use frame::Frame;
-pub use polygon::{Linear, Pieces};
+pub use polygon::{Linear, Pieces, triangle_area};
 pub use ray_tree::{RayHit, RayTree};
 
 /// Half a unit in the last place of 1: the relative error of one rounded f64 operation.

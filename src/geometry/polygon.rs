@@ -42,6 +42,11 @@ pub fn twice_area(polygon: &[DVec2]) -> f64 {
     rest.windows(2).map(|w| (w[0] - first).perp_dot(w[1] - first)).sum()
 }
 
+/// Area of a triangle, positive for counter-clockwise ones.
+pub fn triangle_area([a, b, c]: &[DVec2; 3]) -> f64 {
+    0.5 * (b - a).perp_dot(c - a)
+}
+
 /// A list of convex polygons, stored end to end.
 #[derive(Clone, Debug, Default)]
 pub struct Pieces {

@@ -3,7 +3,10 @@
 //! Boxes are met in f32, padded so that none is missed; triangles decide in f64
 //! ([`super::ray::intersect`]), so that a closed surface has no leaks.
 
-use glam::{DVec3, Vec3A};
+use std::ops::Range;
+
+use glam::{DVec3, Vec4};
+use obvhs::bvh2::node::Bvh2Node;
 
 use super::box_tree::BoxTree;
 use super::{Bounds, ray};
@@ -18,9 +21,15 @@ const ROOM: f32 = 1.0 + 1e-6;
 /// Distances are the same if they differ by less than this, relative.
 const SAME: f64 = 1e-12;
 
+/// Children of a node.
+const WIDTH: usize = 4;
+
 /// Triangles in the order of the leaves of a tree of boxes.
 pub struct RayTree {
+    /// The root first; none where there are no triangles.
     nodes: Vec<Node>,
+    /// First triangle of each leaf and the end of its triangles.
+    leaves: Vec<(u32, u32)>,
     triangles: Vec<[DVec3; 3]>,
     /// Numbers that the triangles came with, and whether front and back are preferred.
     numbers: Vec<u32>,
@@ -29,15 +38,18 @@ pub struct RayTree {
     scale: f64,
 }
 
-/// A box, and two nodes or some triangles in it.
+/// Up to four boxes, and what is in them.
+#[derive(Clone, Copy)]
 struct Node {
-    min: Vec3A,
-    max: Vec3A,
-    /// The first of two children next to each other, or the first triangle.
-    first: u32,
-    /// How many triangles; none for a node with children.
-    count: u32,
+    /// Least, then largest coordinates: by axis those of all boxes.
+    sides: [[Vec4; 3]; 2],
+    /// Numbers of nodes, or of leaves with [`LEAF`] added.
+    children: [u32; WIDTH],
+    /// A bit for each box that is there.
+    there: u32,
 }
+
+const LEAF: u32 = 1 << 31;
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,30 +68,61 @@ impl RayTree {
     pub fn build(triangles: &[[DVec3; 3]], preferred: impl Fn(usize, bool) -> bool) -> RayTree {
         let boxes: Vec<Bounds> = triangles.iter().map(Bounds::of).collect();
         let tree = BoxTree::build(&boxes);
-        let mut ordered = RayTree {
+        let mut own = RayTree {
             nodes: vec![],
+            leaves: vec![],
             triangles: vec![],
             numbers: vec![],
             preferred: vec![],
             centre: tree.centre,
             scale: tree.scale,
         };
-        for node in &tree.tree.nodes {
-            let (mut first, mut count) = (node.first_index, 0);
-            if node.is_leaf() {
-                let begin = node.first_index as usize;
-                (first, count) = (ordered.numbers.len() as u32, node.prim_count);
-                for &number in &tree.tree.primitive_indices[begin..begin + count as usize] {
-                    let own = [false, true].map(|back| preferred(number as usize, back));
-                    ordered.numbers.push(number);
-                    ordered.preferred.push(own);
-                    ordered.triangles.push(triangles[number as usize]);
+        // Nodes of the tree of pairs, and where their numbers go.
+        let mut left: Vec<(&Bvh2Node, Option<(usize, usize)>)> = vec![];
+        left.extend(tree.tree.nodes.first().map(|root| (root, None)));
+        while let Some((node, place)) = left.pop() {
+            let number = own.nodes.len();
+            if let Some((above, k)) = place {
+                own.nodes[above].children[k] = number as u32;
+            }
+            let below = opened(&tree, node);
+            own.nodes.push(Node {
+                sides: [[Vec4::ZERO; 3]; 2],
+                children: [0; WIDTH],
+                there: (1 << below.len()) - 1,
+            });
+            for (k, &child) in below.iter().enumerate() {
+                let (min, max) = (child.aabb.min - PADDING, child.aabb.max + PADDING);
+                let sides = &mut own.nodes[number].sides;
+                for axis in 0..3 {
+                    sides[0][axis][k] = min[axis];
+                    sides[1][axis][k] = max[axis];
+                }
+                if child.is_leaf() {
+                    own.nodes[number].children[k] = LEAF + own.leaves.len() as u32;
+                    own.add_leaf(&tree, child, triangles, &preferred);
                 }
             }
-            let (min, max) = (node.aabb.min - PADDING, node.aabb.max + PADDING);
-            ordered.nodes.push(Node { min, max, first, count });
+            let inner = below.iter().enumerate().filter(|(_, child)| !child.is_leaf());
+            left.extend(inner.rev().map(|(k, child)| (*child, Some((number, k)))));
         }
-        ordered
+        own
+    }
+
+    fn add_leaf(
+        &mut self,
+        tree: &BoxTree,
+        leaf: &Bvh2Node,
+        triangles: &[[DVec3; 3]],
+        preferred: &impl Fn(usize, bool) -> bool,
+    ) {
+        let (first, begin) = (self.numbers.len() as u32, leaf.first_index as usize);
+        for &number in &tree.tree.primitive_indices[begin..begin + leaf.prim_count as usize] {
+            self.numbers.push(number);
+            self.preferred.push([false, true].map(|back| preferred(number as usize, back)));
+            self.triangles.push(triangles[number as usize]);
+        }
+        self.leaves.push((first, self.numbers.len() as u32));
     }
 
     /// The nearest triangle beyond the distance `beyond`, both in units of `direction`.
@@ -94,46 +137,9 @@ impl RayTree {
         stack: &mut Vec<(u32, f32)>,
     ) -> Option<RayHit> {
         let mut best: Option<(RayHit, bool)> = None;
-        if self.nodes.is_empty() {
-            return None;
-        }
-        let start = Vec3A::from(((origin - self.centre) / self.scale).as_vec3());
-        // Nothing is divided by zero: a ray along a side of a box meets it.
-        let tiny = |d: f64| {
-            let d = (d / self.scale) as f32;
-            if d.abs() < 1e-30 { 1e30f32.copysign(d) } else { d.recip() }
-        };
-        let inverse = Vec3A::new(tiny(direction.x), tiny(direction.y), tiny(direction.z));
-        let enter = |node: &Node, end: f32| {
-            let (a, b) = ((node.min - start) * inverse, (node.max - start) * inverse);
-            let near = a.min(b).max_element().max(0.0);
-            let far = a.max(b).min_element().min(end);
-            (near <= far * ROOM).then_some(near)
-        };
-        let mut end = f32::INFINITY;
-        stack.clear();
-        if enter(&self.nodes[0], end).is_some() {
-            stack.push((0, 0.0));
-        }
-        while let Some((index, near)) = stack.pop() {
-            if near > end * ROOM {
-                continue;
-            }
-            let mut node = &self.nodes[index as usize];
-            while node.count == 0 {
-                let pair = [node.first, node.first + 1];
-                let [a, b] = pair.map(|i| enter(&self.nodes[i as usize], end));
-                let (next, other) = match (a, b) {
-                    (Some(a), Some(b)) if a <= b => (pair[0], Some((pair[1], b))),
-                    (Some(a), Some(_)) => (pair[1], Some((pair[0], a))),
-                    (Some(_), None) => (pair[0], None),
-                    (None, Some(_)) => (pair[1], None),
-                    (None, None) => break,
-                };
-                stack.extend(other);
-                node = &self.nodes[next as usize];
-            }
-            for i in node.first as usize..(node.first + node.count) as usize {
+        let line = Line::new(self, origin, direction);
+        self.visit(&line, f32::INFINITY, stack, |leaf, mut end| {
+            for i in leaf {
                 let triangle = &self.triangles[i];
                 let Some(hit) = ray::intersect(origin, direction, triangle) else { continue };
                 if hit.t <= beyond {
@@ -154,9 +160,123 @@ impl RayTree {
                     end = (hit.t as f32).next_up();
                 }
             }
-        }
+            Some(end)
+        });
         best.map(|(hit, _)| hit)
     }
+
+    /// Whether any triangle is met within a range of distances, in units of `direction`; ends not
+    /// included.
+    pub fn is_blocked(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        range: Range<f64>,
+        stack: &mut Vec<(u32, f32)>,
+    ) -> bool {
+        let line = Line::new(self, origin, direction);
+        let mut blocked = false;
+        self.visit(&line, (range.end as f32).next_up(), stack, |mut leaf, end| {
+            blocked = leaf.any(|i| {
+                let hit = ray::intersect(origin, direction, &self.triangles[i]);
+                hit.is_some_and(|hit| hit.t > range.start && hit.t < range.end)
+            });
+            (!blocked).then_some(end)
+        });
+        blocked
+    }
+
+    /// Calls `leaf` with the triangles of each leaf that a line meets before `end`, nearer ones
+    /// mostly first; it returns where the line ends from then on, or nothing to stop.
+    fn visit(
+        &self,
+        line: &Line,
+        mut end: f32,
+        stack: &mut Vec<(u32, f32)>,
+        mut leaf: impl FnMut(Range<usize>, f32) -> Option<f32>,
+    ) {
+        stack.clear();
+        if !self.nodes.is_empty() {
+            stack.push((0, 0.0));
+        }
+        while let Some((index, near)) = stack.pop() {
+            if near > end * ROOM {
+                continue;
+            }
+            if index >= LEAF {
+                let (first, last) = self.leaves[(index - LEAF) as usize];
+                match leaf(first as usize..last as usize, end) {
+                    Some(nearer) => end = nearer,
+                    None => return,
+                }
+                continue;
+            }
+            let node = &self.nodes[index as usize];
+            let (near, mut met) = line.enter(node, end);
+            // The nearest on top.
+            let begin = stack.len();
+            while met != 0 {
+                let k = met.trailing_zeros() as usize;
+                met &= met - 1;
+                let mut place = stack.len();
+                stack.push((node.children[k], near[k]));
+                while place > begin && stack[place - 1].1 < near[k] {
+                    stack.swap(place, place - 1);
+                    place -= 1;
+                }
+            }
+        }
+    }
+}
+
+/// A ray as boxes are met by it.
+struct Line {
+    start: [Vec4; 3],
+    inverse: [Vec4; 3],
+    /// Which side of boxes is met first, by axis.
+    first: [usize; 3],
+}
+
+impl Line {
+    fn new(tree: &RayTree, origin: DVec3, direction: DVec3) -> Line {
+        // Nothing is divided by zero: a ray along a side of a box meets it.
+        let inverse = (direction / tree.scale)
+            .as_vec3()
+            .to_array()
+            .map(|d| if d.abs() < 1e-30 { 1e30f32.copysign(d) } else { d.recip() });
+        let start = ((origin - tree.centre) / tree.scale).as_vec3().to_array();
+        Line {
+            start: start.map(Vec4::splat),
+            inverse: inverse.map(Vec4::splat),
+            first: inverse.map(|d| usize::from(d < 0.0)),
+        }
+    }
+
+    /// Distances at which the boxes of a node are entered, and a bit for each that is before `end`.
+    fn enter(&self, node: &Node, end: f32) -> ([f32; WIDTH], u32) {
+        let at = |side: usize, axis: usize| {
+            (node.sides[side][axis] - self.start[axis]) * self.inverse[axis]
+        };
+        let [x, y, z] = self.first;
+        let near = at(x, 0).max(at(y, 1)).max(at(z, 2)).max(Vec4::ZERO);
+        let far = at(1 - x, 0).min(at(1 - y, 1)).min(at(1 - z, 2)).min(Vec4::splat(end));
+        let met = near.cmple(far * ROOM).bitmask() & node.there;
+        (near.to_array(), met)
+    }
+}
+
+/// What is below a node: the largest box is opened until there are [`WIDTH`].
+fn opened<'a>(tree: &'a BoxTree, node: &'a Bvh2Node) -> Vec<&'a Bvh2Node> {
+    let mut boxes = vec![node];
+    while boxes.len() < WIDTH {
+        let inner = (0..boxes.len()).filter(|&k| !boxes[k].is_leaf());
+        let size = |&k: &usize| boxes[k].aabb.half_area();
+        let Some(largest) = inner.max_by(|a, b| size(a).total_cmp(&size(b))) else { break };
+        let first = boxes[largest].first_index as usize;
+        boxes[largest] = &tree.tree.nodes[first];
+        boxes.insert(largest + 1, &tree.tree.nodes[first + 1]);
+    }
+    boxes
 }
 
 #[cfg(test)]
@@ -189,6 +309,10 @@ mod tests {
             for (origin, to) in scattered(500).zip(scattered(700).skip(200)) {
                 let (origin, direction) = (scale * origin, to - DVec3::splat(0.5));
                 let hit = tree.nearest(origin, direction, 0.0, &mut stack);
+                let nearest = hit.map_or(1.0, |hit| hit.t);
+                let mut blocked = |end| tree.is_blocked(origin, direction, 0.0..end, &mut stack);
+                assert!(!blocked(nearest * (1.0 - 1e-9)));
+                assert_eq!(blocked(nearest * (1.0 + 1e-9)), hit.is_some());
                 let want = (0..triangles.len())
                     .filter_map(|i| Some((ray::intersect(origin, direction, &triangles[i])?.t, i)))
                     .filter(|(t, _)| *t > 0.0)

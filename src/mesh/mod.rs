@@ -16,7 +16,7 @@ mod shape;
 
 use glam::{DVec2, DVec3};
 
-use crate::geometry::{Bounds, Frame};
+use crate::geometry::{Bounds, Frame, triangle_area};
 
 pub use crate::geometry::CONTACT;
 pub use appearance::appearance;
@@ -162,10 +162,23 @@ impl Mesh {
         (frame.lift(w.x * v1 + w.y * v2 + w.z * v3), frame.n)
     }
 
+    /// Front and back face of each input triangle, where it radiates.
+    pub fn sides(&self, triangles: usize) -> Vec<[Option<u32>; 2]> {
+        let mut sides = vec![[None; 2]; triangles];
+        for (i, face) in self.faces.iter().enumerate() {
+            sides[face.triangle as usize][usize::from(face.back)] = Some(i as u32);
+        }
+        sides
+    }
+
+    /// The plane of a root.
+    pub fn root_frame(&self, root: u32) -> &Frame {
+        &self.faces[self.roots[root as usize].face as usize].frame
+    }
+
     /// Area of an element, square metres.
     pub fn area(&self, element: usize) -> f64 {
-        let [v1, v2, v3] = self.element_corners[element];
-        0.5 * (v2 - v1).perp_dot(v3 - v1)
+        triangle_area(&self.element_corners[element])
     }
 
     /// Longest edge of all elements, metres.

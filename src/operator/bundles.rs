@@ -13,15 +13,18 @@
 //! Lamps are left to exact gathering. Directions depend on the point alone ([`super::hemisphere`]),
 //! so that all channels and all solutions meet the same faces, and so does every run.
 
-use glam::DVec3;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::hemisphere::{direction, flips};
+use super::hemisphere::{direction, flips, near_ones_together};
 use super::lamps::{Lamps, Samples};
-use super::patches::{Patches, Spot};
+use super::patches::{Patches, SPOTS, Spot};
 use super::walk::Walker;
 use crate::error::{Error, Result};
-use crate::geometry::{COINCIDENCE, Frame, RayTree};
+use crate::geometry::{COINCIDENCE, RayTree};
 use crate::mesh::Mesh;
 use crate::monitor::Monitor;
 use crate::scene::Scene;
@@ -40,19 +43,29 @@ pub struct RayScene {
     sides: Vec<[Option<u32>; 2]>,
     /// Nothing nearer than this is met, metres.
     beyond: f64,
+    /// Orders of 2^k rays.
+    orders: Vec<Vec<u32>>,
 }
+
+/// Rays are put in order by blocks of at most two to this power.
+const BLOCK_POWER: u32 = 10;
 
 /// What one ray met.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Met {
+pub enum Met {
+    /// It leaves the scene.
     Nothing,
     /// A side that does not radiate.
     Black,
-    /// A patch, on a face at a distance (squared), at a cosine.
-    Patch {
-        number: u32,
+    /// A face, at a point in its plane and a distance (squared), at a cosine.
+    Face {
+        /// The face.
         face: u32,
+        /// The point in its plane.
+        x: DVec2,
+        /// Distance squared, m^2.
         square: f64,
+        /// Between the ray and the face's normal.
         cosine: f64,
     },
 }
@@ -60,41 +73,40 @@ enum Met {
 impl RayScene {
     /// Prepares a meshed scene.
     pub fn new(scene: &Scene, mesh: &Mesh) -> RayScene {
-        let mut sides = vec![[None; 2]; scene.triangles.len()];
-        for (i, face) in mesh.faces.iter().enumerate() {
-            sides[face.triangle as usize][usize::from(face.back)] = Some(i as u32);
-        }
+        let sides = mesh.sides(scene.triangles.len());
         let triangles: Vec<[DVec3; 3]> = scene.triangles.iter().map(|t| t.vertices).collect();
         let tree = RayTree::build(&triangles, |i, back| sides[i][usize::from(back)].is_some());
-        RayScene { tree, sides, beyond: COINCIDENCE * mesh.magnitude }
+        let orders = (0..=BLOCK_POWER).map(near_ones_together).collect();
+        RayScene { tree, sides, beyond: COINCIDENCE * mesh.magnitude, orders }
+    }
+
+    /// Numbers from `first` on of `count` rays, a power of two, near ones one after the other; `first`
+    /// is a multiple of `count`.
+    pub fn in_order(&self, first: u32, count: u32) -> impl Iterator<Item = u32> {
+        let order = &self.orders[count.trailing_zeros().min(BLOCK_POWER) as usize];
+        let block = order.len() as u32;
+        (0..count / block).flat_map(move |k| order.iter().map(move |o| first + k * block + o))
     }
 
     /// Whether anything stands between two points; sides that touch either do not count.
     pub fn is_blocked(&self, walker: &mut Walker, from: DVec3, to: DVec3) -> bool {
         let along = to - from;
         let length = along.length();
-        let hit = self.tree.nearest(from, along / length, self.beyond, &mut walker.boxes);
-        hit.is_some_and(|hit| hit.t < length * (1.0 - ROUNDINGS) - self.beyond)
+        let range = self.beyond..length * (1.0 - ROUNDINGS) - self.beyond;
+        self.tree.is_blocked(from, along / length, range, &mut walker.boxes)
     }
 
-    fn cast(
-        &self,
-        walker: &mut Walker,
-        mesh: &Mesh,
-        patches: &Patches,
-        origin: DVec3,
-        direction: DVec3,
-    ) -> Met {
+    /// What a ray meets first; sides that touch its origin do not count.
+    pub fn cast(&self, walker: &mut Walker, mesh: &Mesh, origin: DVec3, direction: DVec3) -> Met {
         let hit = self.tree.nearest(origin, direction, self.beyond, &mut walker.boxes);
         let Some(hit) = hit else { return Met::Nothing };
         match self.sides[hit.triangle as usize][usize::from(hit.back)] {
             None => Met::Black,
             Some(face) => {
                 let frame = &mesh.faces[face as usize].frame;
-                let x = frame.project(origin + hit.t * direction);
-                Met::Patch {
-                    number: patches.at(face, x) as u32,
+                Met::Face {
                     face,
+                    x: frame.project(origin + hit.t * direction),
                     square: hit.t * hit.t,
                     cosine: -direction.dot(frame.n),
                 }
@@ -105,9 +117,9 @@ impl RayScene {
 
 /// Rows of an operator on patches: irradiance at each spot is a mean of the radiosities of patches.
 pub struct Rows {
-    /// Patch and weight, one row after the other, and where each row ends.
+    /// Patch and weight, and where those of each row are.
     entries: Vec<(u32, f32)>,
-    ends: Vec<usize>,
+    ranges: Vec<Range<usize>>,
     /// Whether a spot is under something: it does not count.
     buried: Vec<bool>,
     /// Emitted light that arrives at each spot, W/m^2.
@@ -115,7 +127,8 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Casts rays from each spot, and looks at points of `lamps`.
+    /// Casts rays from each spot, and looks at points of `lamps`. Spots of patches that have none in the
+    /// open, but are seen, are moved to where they are seen.
     ///
     /// # Errors
     ///
@@ -123,14 +136,14 @@ impl Rows {
     pub fn cast(
         scene: &RayScene,
         mesh: &Mesh,
-        patches: &Patches,
+        patches: &mut Patches,
         (lamps, samples): (&Lamps, Samples),
         max_memory: u64,
         monitor: &Monitor,
     ) -> Result<Rows> {
-        let spots = patches.spots();
+        let spots = patches.spots().to_vec();
         let stage = monitor.stage("rays", spots.len() as u64);
-        let mut rows = Rows { entries: vec![], ends: vec![], buried: vec![], direct: vec![] };
+        let mut rows = Rows { entries: vec![], ranges: vec![], buried: vec![], direct: vec![] };
         // In blocks, so that memory is known before it is too much.
         for block in spots.chunks(BLOCK) {
             let found: Vec<Option<Row>> = block
@@ -143,11 +156,12 @@ impl Rows {
             for own in found {
                 rows.buried.push(own.is_none());
                 let own = own.unwrap_or_default();
-                rows.entries.extend(own.entries);
-                rows.ends.push(rows.entries.len());
                 rows.direct.push(own.direct.to_array());
+                let begin = rows.entries.len();
+                rows.entries.extend(own.entries);
+                rows.ranges.push(begin..rows.entries.len());
             }
-            let share = rows.ends.len() as f64 / spots.len() as f64;
+            let share = rows.ranges.len() as f64 / spots.len() as f64;
             let needed = (rows.bytes() as f64 / share) as u64;
             if needed > max_memory {
                 return Err(Error::Memory {
@@ -158,18 +172,92 @@ impl Rows {
                 });
             }
         }
+        let lost = rows.lost(patches);
+        if lost.contains(&true) {
+            let moved = rows.put_where_seen(scene, mesh, patches, samples, &lost);
+            let again: Vec<(usize, Option<Row>)> = moved
+                .into_par_iter()
+                .map_init(Walker::default, |walker, spot| {
+                    let at = &patches.spots()[spot];
+                    (spot, row(scene, mesh, patches, (lamps, samples), walker, at))
+                })
+                .collect();
+            for (spot, own) in again {
+                let Some(own) = own else { continue };
+                let begin = rows.entries.len();
+                rows.entries.extend(own.entries);
+                rows.ranges[spot] = begin..rows.entries.len();
+                rows.direct[spot] = own.direct.to_array();
+                rows.buried[spot] = false;
+            }
+        }
         Ok(rows)
+    }
+
+    /// Patches all spots of which are buried.
+    fn lost(&self, patches: &Patches) -> Vec<bool> {
+        let buried = |patch| patches.range(patch).all(|spot| self.buried[spot]);
+        (0..patches.len()).map(buried).collect()
+    }
+
+    /// Moves the spots of `lost` patches to where rays of others meet them, and tells which spots
+    /// were moved.
+    fn put_where_seen(
+        &self,
+        scene: &RayScene,
+        mesh: &Mesh,
+        patches: &mut Patches,
+        samples: Samples,
+        lost: &[bool],
+    ) -> Vec<usize> {
+        let meets = |row: &usize| {
+            let own = &self.entries[self.ranges[*row].clone()];
+            own.iter().any(|&(patch, _)| lost[patch as usize])
+        };
+        let known: &Patches = patches;
+        let met: Vec<Vec<(u32, Spot)>> = (0..self.ranges.len())
+            .into_par_iter()
+            .filter(meets)
+            .map_init(Walker::default, |walker, row| {
+                let spot = &known.spots()[row];
+                let frame = &mesh.faces[spot.face as usize].frame;
+                let origin = frame.lift(spot.x);
+                let flips = flips(origin);
+                let hits = scene.in_order(0, samples.rays).filter_map(|k| {
+                    match scene.cast(walker, mesh, origin, direction(frame, k, flips)) {
+                        Met::Face { face, x, .. } => {
+                            let patch = known.at(face, x) as u32;
+                            lost[patch as usize].then_some((patch, Spot { face, x }))
+                        }
+                        _ => None,
+                    }
+                });
+                hits.collect()
+            })
+            .collect();
+        let mut found: BTreeMap<u32, Vec<Spot>> = BTreeMap::new();
+        for (patch, spot) in met.into_iter().flatten() {
+            let own = found.entry(patch).or_default();
+            if own.len() < SPOTS {
+                own.push(spot);
+            }
+        }
+        let mut moved = vec![];
+        for (patch, spots) in found {
+            patches.put_spots(patch as usize, &spots);
+            moved.extend(patches.range(patch as usize));
+        }
+        moved
     }
 
     /// Irradiance at each spot from radiosities `u` of patches, for C channels.
     pub fn at_spots<const C: usize>(&self, u: &[[f64; C]]) -> Vec<[f64; C]> {
-        (0..self.ends.len())
-            .into_par_iter()
+        self.ranges
+            .par_iter()
             .with_min_len(64)
-            .map(|row| {
-                let begin = if row == 0 { 0 } else { self.ends[row - 1] };
+            .map(|range| {
                 let mut sum = [0.0; C];
-                for &(patch, weight) in &self.entries[begin..self.ends[row]] {
+                for &(patch, weight) in &self.entries[range.clone()] {
                     let u = &u[patch as usize];
                     (0..C).for_each(|c| sum[c] += f64::from(weight) * u[c]);
                 }
@@ -199,11 +287,9 @@ impl Rows {
     /// Smallest and largest share of the rays of a spot that meet something that radiates; of spots
     /// that are not buried.
     pub fn sums(&self) -> (f64, f64) {
-        let mut begin = 0;
         let mut all = (1.0f64, 0.0f64);
-        for (&end, buried) in self.ends.iter().zip(&self.buried) {
-            let sum: f64 = self.entries[begin..end].iter().map(|e| f64::from(e.1)).sum();
-            begin = end;
+        for (range, buried) in self.ranges.iter().zip(&self.buried) {
+            let sum: f64 = self.entries[range.clone()].iter().map(|e| f64::from(e.1)).sum();
             if !buried {
                 all = (all.0.min(sum), all.1.max(sum));
             }
@@ -218,7 +304,7 @@ impl Rows {
 
     /// Bytes that are stored.
     pub fn bytes(&self) -> usize {
-        size_of::<(u32, f32)>() * self.entries.len() + size_of::<usize>() * self.ends.len()
+        size_of::<(u32, f32)>() * self.entries.len() + size_of::<Range<usize>>() * self.ranges.len()
     }
 }
 
@@ -245,11 +331,11 @@ fn row(
     let origin = frame.lift(spot.x);
     let flips = flips(origin);
     let (mut all, mut black, mut direct) = (vec![], 0, DVec3::ZERO);
-    for k in 0..samples.rays {
+    for k in scene.in_order(0, samples.rays) {
         let towards = direction(frame, k, flips);
-        match scene.cast(walker, mesh, patches, origin, towards) {
-            Met::Patch { number, face, square, cosine } => {
-                all.push(number);
+        match scene.cast(walker, mesh, origin, towards) {
+            Met::Face { face, x, square, cosine } => {
+                all.push(patches.at(face, x) as u32);
                 direct += lamps.met(face, square, cosine * towards.dot(frame.n), samples);
             }
             Met::Black => black += 1,
@@ -259,78 +345,9 @@ fn row(
     if f64::from(black) > BURIED * f64::from(samples.rays) {
         return None;
     }
-    direct += lamps.by_points(walker, scene, (origin, frame.n), samples);
+    direct += lamps.by_points(walker, scene, (origin, frame.n), (0, samples.points), samples).seen;
     all.sort_unstable();
-    let weight = |count: usize| (count as f64 / f64::from(samples.rays)) as f32;
-    let entries = all.chunk_by(|a, b| a == b).map(|same| (same[0], weight(same.len()))).collect();
+    let share = |count: usize| (count as f64 / f64::from(samples.rays)) as f32;
+    let entries = all.chunk_by(|a, b| a == b).map(|same| (same[0], share(same.len()))).collect();
     Some(Row { entries, direct })
-}
-
-/// What patches radiate, ready for gathering.
-pub struct RayRadiant {
-    /// Radiosity of each patch, W/m^2.
-    pub radiosity: Vec<DVec3>,
-    /// The patches.
-    pub patches: Patches,
-}
-
-/// Rays that are cast before it is known whether they suffice, and at most.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RayCounts {
-    /// A power of two.
-    pub least: u32,
-    /// At most so many: a power of two.
-    pub most: u32,
-}
-
-/// Irradiance that rays estimated.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Estimated {
-    /// Irradiance, W/m^2.
-    pub irradiance: DVec3,
-    /// Half of the difference between the two halves of the rays: about how far it is off, rather
-    /// more.
-    pub spread: DVec3,
-    /// Rays cast.
-    pub rays: u32,
-}
-
-impl RayRadiant {
-    /// Irradiance at a point with a unit normal from as many rays as it takes for a spread of at
-    /// most `allowed` (W/m^2) in each channel.
-    pub fn gather(
-        &self,
-        walker: &mut Walker,
-        (scene, mesh): (&RayScene, &Mesh),
-        (point, normal): (DVec3, DVec3),
-        allowed: f64,
-        counts: RayCounts,
-    ) -> Estimated {
-        let frame = Frame::new(point, normal);
-        let flips = flips(point);
-        let mut sums: Vec<DVec3> = vec![];
-        let block = counts.least / 2;
-        loop {
-            let first = sums.len() as u32 * block;
-            let mut sum = DVec3::ZERO;
-            for k in first..first + block {
-                let met =
-                    scene.cast(walker, mesh, &self.patches, point, direction(&frame, k, flips));
-                if let Met::Patch { number, .. } = met {
-                    sum += self.radiosity[number as usize];
-                }
-            }
-            sums.push(sum);
-            if sums.len().is_power_of_two() && sums.len() > 1 {
-                let rays = sums.len() as u32 * block;
-                let half = sums.len() / 2;
-                let [a, b] = [&sums[..half], &sums[half..]]
-                    .map(|s| s.iter().sum::<DVec3>() / f64::from(rays / 2));
-                let spread = 0.5 * (a - b).abs();
-                if spread.max_element() <= allowed || rays >= counts.most {
-                    return Estimated { irradiance: 0.5 * (a + b), spread, rays };
-                }
-            }
-        }
-    }
 }

@@ -11,7 +11,7 @@ use glam::{DVec2, DVec3};
 
 use super::walk::{Scope, Stage, Walker};
 use crate::cluster::adaptive::Field;
-use crate::geometry::Pieces;
+use crate::geometry::{Pieces, triangle_area};
 use crate::kernel::{Moments, Precision};
 use crate::mesh::{Basis, child};
 use crate::visibility::Coverage;
@@ -48,7 +48,7 @@ impl<'a> Cell<'a> {
         let corners = &stage.mesh.roots[root as usize].corners;
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
         let radius = corners.iter().map(|x| x.distance(centre)).fold(0.0, f64::max);
-        let area = 0.5 * (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]);
+        let area = triangle_area(corners);
         Cell { number: root, corners, radius, area }
     }
 }

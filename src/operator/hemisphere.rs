@@ -42,6 +42,21 @@ pub fn in_square(index: u32, flips: [u32; 2]) -> DVec2 {
     DVec2::new(unit(first ^ flips[0]), unit(second ^ flips[1]))
 }
 
+/// The numbers below 2^`power` in an order in which points of a net follow near ones (a Z curve),
+/// also when a multiple of that is added to all: rays that go the same way meet the same boxes.
+pub fn near_ones_together(power: u32) -> Vec<u32> {
+    let place = |index: u32| {
+        let x = 65_536.0 * in_square(index, [0, 0]);
+        let (x, y) = (x.x as u32, x.y as u32);
+        (0..16).fold(0u32, |all, bit| {
+            all | (x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1)
+        })
+    };
+    let mut order: Vec<u32> = (0..1 << power).collect();
+    order.sort_by_key(|&index| place(index));
+    order
+}
+
 /// Unit direction number `index` about a frame's normal, with density cos/pi: the mean of the
 /// radiosity that such directions meet is the irradiance.
 pub fn direction(frame: &Frame, index: u32, flips: [u32; 2]) -> DVec3 {

@@ -10,6 +10,10 @@
 //! ```
 //!
 //! where g is the density, over the surface, of the points that rays meet.
+//!
+//! Where what emits has few faces, what would arrive if nothing stood in between is known in closed
+//! form, and samples tell but the share of it that arrives: that is known exactly wherever nothing,
+//! or everything, is in shadow.
 
 use std::f64::consts::PI;
 
@@ -18,7 +22,9 @@ use glam::{DVec2, DVec3};
 use super::bundles::RayScene;
 use super::hemisphere::{flips, in_square};
 use super::walk::Walker;
-use crate::mesh::{Mesh, barycentric};
+use crate::geometry::{COINCIDENCE, Frame, Pieces, ray, triangle_area};
+use crate::kernel::{self, Precision, View};
+use crate::mesh::Mesh;
 use crate::scene::{self, Scene};
 
 /// All that emits.
@@ -30,7 +36,30 @@ pub struct Lamps {
     until: Vec<f64>,
     /// One over the power of all, 1/W.
     density: f64,
+    /// Whether no texture varies what a face emits.
+    even: bool,
+    /// Largest coordinate of the scene, metres.
+    magnitude: f64,
 }
+
+/// What is found of emitted light, W/m^2.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lit {
+    /// By samples that see what emits.
+    pub seen: DVec3,
+    /// By all samples, as if nothing stood in between: only where [`Lamps::are_few`].
+    pub all: DVec3,
+}
+
+impl std::ops::AddAssign for Lit {
+    fn add_assign(&mut self, more: Lit) {
+        self.seen += more.seen;
+        self.all += more.all;
+    }
+}
+
+/// With more faces that emit than these it does not pay to know the unshadowed light.
+const FEW: usize = 32;
 
 /// How many samples of each kind there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +73,8 @@ pub struct Samples {
 /// A face that emits.
 struct Lamp {
     corners: [DVec3; 3],
-    normal: DVec3,
+    frame: Frame,
+    flat: [DVec2; 3],
     /// Exitance, W/m^2.
     exitance: DVec3,
 }
@@ -53,23 +83,79 @@ impl Lamps {
     /// All faces of a mesh that emit; textures are averaged over each.
     pub fn new(scene: &Scene, mesh: &Mesh) -> Lamps {
         let (mut lamps, mut until, mut sum) = (vec![], vec![], 0.0);
-        let mut of_face = vec![];
+        let (mut of_face, mut even) = (vec![], true);
         for face in &mesh.faces {
-            let whole = face.corners.map(|x| barycentric(&face.corners, x));
-            let whole = if face.back { whole.map(|w| DVec3::new(w.x, w.z, w.y)) } else { whole };
+            let whole = face.corners.map(|x| face.triangle_weights(x));
             let e = scene::exitance(scene, face.triangle as usize, &whole);
-            let [a, b, c] = face.corners;
-            let power = 0.5 * (b - a).perp_dot(c - a) * e.max_element();
+            let power = triangle_area(&face.corners) * e.max_element();
             of_face.push((power > 0.0).then_some(lamps.len() as u32));
             if power > 0.0 {
+                let material = scene.triangles[face.triangle as usize].material as usize;
+                even &= scene.materials[material].radiance_texture.is_none();
                 sum += power;
                 until.push(sum);
                 let corners = face.corners.map(|x| face.frame.lift(x));
-                lamps.push(Lamp { corners, normal: face.frame.n, exitance: e });
+                let (frame, flat) = (face.frame, face.corners);
+                lamps.push(Lamp { corners, frame, flat, exitance: e });
             }
         }
         until.iter_mut().for_each(|u| *u /= sum);
-        Lamps { lamps, of_face, until, density: 1.0 / sum }
+        Lamps { lamps, of_face, until, density: 1.0 / sum, even, magnitude: mesh.magnitude }
+    }
+
+    /// Whether each face emits evenly: otherwise what samples find is a mean over it.
+    pub fn are_even(&self) -> bool {
+        self.even
+    }
+
+    /// Whether they are so few that [`Lamps::unshadowed`] is worth its time.
+    pub fn are_few(&self) -> bool {
+        self.lamps.len() <= FEW
+    }
+
+    /// Irradiance at a point with a unit normal if nothing stood in between, W/m^2.
+    pub fn unshadowed(&self, point: DVec3, normal: DVec3) -> DVec3 {
+        let mut scratch = Pieces::default();
+        let mut sum = DVec3::ZERO;
+        for lamp in &self.lamps {
+            let view = View::new(&lamp.frame, point, normal);
+            if view.d > COINCIDENCE * self.magnitude {
+                let horizon = view.horizon(self.magnitude);
+                let (flat, exact) = (&lamp.flat, &Precision::EXACT);
+                let found =
+                    kernel::moments_above(&view, flat, flat[0], &horizon, exact, &mut scratch);
+                sum += found.zeroth / PI * lamp.exitance;
+            }
+        }
+        sum
+    }
+
+    /// All that a ray from a point would meet of what emits if nothing stood in between, where these
+    /// are few; as [`Lamps::met`].
+    pub fn along(&self, point: DVec3, direction: DVec3, cosine: f64, samples: Samples) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        for lamp in &self.lamps {
+            let from = -direction.dot(lamp.frame.n);
+            if from <= 0.0 || lamp.frame.height(point) <= COINCIDENCE * self.magnitude {
+                continue;
+            }
+            if let Some(hit) = ray::intersect(point, direction, &lamp.corners)
+                && hit.t > 0.0
+            {
+                sum += self.weighed(lamp, hit.t * hit.t, cosine * from, samples);
+            }
+        }
+        sum
+    }
+
+    /// How many faces emit.
+    pub fn len(&self) -> usize {
+        self.lamps.len()
+    }
+
+    /// Whether none does.
+    pub fn is_empty(&self) -> bool {
+        self.lamps.is_empty()
     }
 
     /// What a ray that met a face adds to the irradiance where it came from, from the distance
@@ -88,20 +174,22 @@ impl Lamps {
         of_rays / both * lamp.exitance
     }
 
-    /// What points of all that emits add to the irradiance at a point with a unit normal.
+    /// What `count` points of all that emits, from number `first` on, add to the irradiance at a
+    /// point with a unit normal.
     pub fn by_points(
         &self,
         walker: &mut Walker,
         rays: &RayScene,
         (point, normal): (DVec3, DVec3),
+        (first, count): (u32, u32),
         samples: Samples,
-    ) -> DVec3 {
-        if self.lamps.is_empty() {
-            return DVec3::ZERO;
+    ) -> Lit {
+        if self.is_empty() {
+            return Lit::default();
         }
         let flips = flips(point);
-        let mut sum = DVec3::ZERO;
-        for k in 0..samples.points {
+        let mut sum = Lit::default();
+        for k in rays.in_order(first, count) {
             let x = in_square(k, flips);
             let place = self.until.partition_point(|&u| u <= x.x).min(self.lamps.len() - 1);
             let lamp = &self.lamps[place];
@@ -110,9 +198,13 @@ impl Lamps {
             let at = on_triangle(&lamp.corners, DVec2::new(along, x.y));
             let between = at - point;
             let square = between.length_squared();
-            let cosines = between.dot(normal) * -between.dot(lamp.normal);
-            if between.dot(normal) > 0.0 && cosines > 0.0 && !rays.is_blocked(walker, point, at) {
-                sum += self.weighed(lamp, square, cosines / square, samples);
+            let cosines = between.dot(normal) * -between.dot(lamp.frame.n);
+            if between.dot(normal) > 0.0 && cosines > 0.0 {
+                let own = self.weighed(lamp, square, cosines / square, samples);
+                sum.all += own;
+                if !rays.is_blocked(walker, point, at) {
+                    sum.seen += own;
+                }
             }
         }
         sum

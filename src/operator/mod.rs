@@ -14,6 +14,7 @@ pub mod lamps;
 pub mod links;
 pub mod pairs;
 pub mod patches;
+pub mod ray_gather;
 pub mod reach;
 pub mod runs;
 pub mod walk;

@@ -11,6 +11,7 @@ use glam::{DVec2, DVec3};
 
 use super::walk::Stage;
 use crate::cluster::fit::Deviation;
+use crate::geometry::triangle_area;
 use crate::mesh::child;
 use crate::visibility::{Coverage, Shaft, faces_away};
 
@@ -45,8 +46,7 @@ impl Cell {
     /// A whole root.
     pub fn root(stage: Stage, root: u32) -> Cell {
         let r = &stage.mesh.roots[root as usize];
-        let [a, b, c] = r.corners;
-        let area = 0.5 * (b - a).perp_dot(c - a);
+        let area = triangle_area(&r.corners);
         let radius = stage.clusters.root_radius[root as usize];
         Cell::new(stage, (root, r.face), (0, r.level), 0, r.corners, radius, area)
     }

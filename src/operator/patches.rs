@@ -38,7 +38,7 @@ pub struct Spot {
 }
 
 /// Patches of all faces of a mesh.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Patches {
     /// Where the squares of each face are.
     grids: Vec<Grid>,
@@ -108,16 +108,7 @@ impl Patches {
         if count > MOST_SQUARES {
             return Err(Error::Usage("there would be too many patches".into()));
         }
-        let mut patches = Patches {
-            grids: vec![],
-            squares: vec![],
-            shapes: vec![],
-            spots: vec![],
-            ends: vec![],
-            area: vec![],
-            exitance: vec![],
-            reflectance: vec![],
-        };
+        let mut patches = Patches::default();
         let mut joined: HashMap<Key, usize> = HashMap::new();
         let mut cubes: Vec<([i64; 3], Vec<u32>)> = vec![];
         let mut cut: Vec<Shape> = vec![];
@@ -155,15 +146,8 @@ impl Patches {
     /// The same with some patches split in four squares (or eight cubes), of which none may be left
     /// smaller than `least` metres.
     pub fn split(&self, scene: &Scene, mesh: &Mesh, which: &[bool], least: f64) -> Patches {
-        let mut patches = Patches {
-            shapes: vec![],
-            spots: vec![],
-            ends: vec![],
-            area: vec![],
-            exitance: vec![],
-            reflectance: vec![],
-            ..self.clone()
-        };
+        let (grids, squares) = (self.grids.clone(), self.squares.clone());
+        let mut patches = Patches { grids, squares, ..Patches::default() };
         let mut cut = vec![];
         for (number, shape) in self.shapes.iter().enumerate() {
             match shape {
@@ -281,6 +265,13 @@ impl Patches {
     pub fn range(&self, patch: usize) -> std::ops::Range<usize> {
         let begin = if patch == 0 { 0 } else { self.ends[patch - 1] };
         begin..self.ends[patch]
+    }
+
+    /// Puts the spots of a patch at other points of it, one or more.
+    pub fn put_spots(&mut self, patch: usize, at: &[Spot]) {
+        for (k, spot) in self.range(patch).enumerate() {
+            self.spots[spot] = at[k % at.len()];
+        }
     }
 
     /// The patch at a point of a face, given in its plane.

@@ -10,8 +10,8 @@ use glam::{DVec2, DVec3};
 
 use crate::cluster::fit::Deviation;
 use crate::cluster::{Clusters, admissible};
-use crate::geometry::Pieces;
 use crate::geometry::polygon::Linear;
+use crate::geometry::{Pieces, triangle_area};
 use crate::gray;
 use crate::kernel::{Moments, Precision, View};
 use crate::mesh::{Basis, Face, Mesh, child};
@@ -135,7 +135,7 @@ impl FitRule {
     ) -> bool {
         let distance = ((centre - view.foot).length_squared() + view.d * view.d).sqrt() - radius;
         let factor = if distance > 0.0 {
-            let area = 0.5 * (t[1] - t[0]).perp_dot(t[2] - t[0]);
+            let area = triangle_area(t);
             let cosine = (view.d / distance).min(1.0);
             area * cosine / (std::f64::consts::PI * distance * distance)
         } else {

@@ -33,8 +33,8 @@ pub struct Point {
 /// What was found at a point, channels R, G, B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbeResult {
-    /// Irradiance on the side that the normal points to, W/m^2.
-    pub irradiance: DVec3,
+    /// Irradiance on the side that the normal points to, W/m^2; none where time ran out before.
+    pub irradiance: Option<DVec3>,
     /// Radiosity of the surface there, W/m^2; none where there is no surface.
     pub radiosity: Option<DVec3>,
 }
@@ -78,24 +78,21 @@ pub fn parse_points(path: &Path, text: &str) -> Result<Vec<Point>> {
 }
 
 /// The results as a table, one line for each point, numbers with as many digits as it takes to
-/// read the same f64 back. The radiosity is empty where there is none.
+/// read the same f64 back. What is not there is empty.
 pub fn format_results(points: &[Point], results: &[ProbeResult]) -> String {
     let mut table = String::with_capacity(RESULT_HEADER.len() + 1 + 200 * points.len());
     table.push_str(RESULT_HEADER);
     table.push('\n');
     for (point, result) in points.iter().zip(results) {
-        let given = point.position.to_array().into_iter().chain(point.normal.to_array());
-        for (i, v) in given.chain(result.irradiance.to_array()).enumerate() {
+        let found = [Some(point.position), Some(point.normal), result.irradiance, result.radiosity];
+        for (i, vector) in found.into_iter().enumerate() {
             let comma = if i == 0 { "" } else { "," };
             // `{:?}` is the shortest text that reads back, with an exponent where that is
             // shorter. Writing to a String cannot fail.
-            let _ = write!(table, "{comma}{v:?}");
-        }
-        match result.radiosity {
-            Some(u) => {
-                let _ = write!(table, ",{:?},{:?},{:?}", u.x, u.y, u.z);
-            }
-            None => table.push_str(",,,"),
+            let _ = match vector {
+                Some(v) => write!(table, "{comma}{:?},{:?},{:?}", v.x, v.y, v.z),
+                None => write!(table, "{comma},,"),
+            };
         }
         table.push('\n');
     }
@@ -239,8 +236,11 @@ mod tests {
             Point { position: DVec3::ZERO, normal: DVec3::new(0.6, 0.0, 0.8) },
         ];
         let results = [
-            ProbeResult { irradiance: DVec3::splat(third), radiosity: None },
-            ProbeResult { irradiance: DVec3::ONE, radiosity: Some(DVec3::new(third, 2.0, 3e-9)) },
+            ProbeResult { irradiance: Some(DVec3::splat(third)), radiosity: None },
+            ProbeResult {
+                irradiance: Some(DVec3::ONE),
+                radiosity: Some(DVec3::new(third, 2.0, 3e-9)),
+            },
         ];
         let table = format_results(&points, &results);
         let lines: Vec<&str> = table.lines().collect();

@@ -22,11 +22,19 @@ pub fn peak_memory() -> Option<u64> {
 }
 
 /// Memory that this process may use, bytes: that of the machine, or less where the process runs
-/// in a control group (a container) with a limit.
+/// in a control group (a container) with a limit, or has a limit of its own (`ulimit -v`).
 pub fn usable_memory() -> Option<u64> {
     let machine = fs::read_to_string("/proc/meminfo").ok();
     let machine = machine.and_then(|text| kilobytes(&text, "MemTotal:"));
-    machine.into_iter().chain(group_limit()).min()
+    let own = fs::read_to_string("/proc/self/limits").ok();
+    let own = own.and_then(|text| soft_limit(&text, "Max address space"));
+    machine.into_iter().chain(group_limit()).chain(own).min()
+}
+
+/// The soft one of the limits in a line `NAME  soft  hard  unit`; `unlimited` is none.
+fn soft_limit(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    line.split_ascii_whitespace().next()?.parse().ok()
 }
 
 /// User and system ticks: the 14th and 15th fields. The second is the program's name in
@@ -104,6 +112,16 @@ mod tests {
         let text = "VmPeak:\t  99 kB\nVmHWM:\t   12 kB\n";
         assert_eq!(kilobytes(text, "VmHWM:"), Some(12 * 1024));
         assert_eq!(kilobytes(text, "VmSwap:"), None);
+    }
+
+    #[test]
+    fn limits_of_the_process_are_in_bytes_or_unlimited() {
+        let text = "Limit     Soft Limit    Hard Limit   Units\n\
+                    Max data size    unlimited    unlimited   bytes\n\
+                    Max address space    4096    8192    bytes\n";
+        assert_eq!(soft_limit(text, "Max address space"), Some(4096));
+        assert_eq!(soft_limit(text, "Max data size"), None);
+        assert_eq!(soft_limit(text, "Max file size"), None);
     }
 
     #[cfg(target_os = "linux")]

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::operator::walk::Walker;
 use crate::output::csv::{Point, ProbeResult};
@@ -16,7 +16,8 @@ const ON_SURFACE: f64 = 1e-6;
 /// Irradiance (W/m^2) at each point and normal, and radiosity of the surface there.
 ///
 /// A point that lies on a surface but for `ON_SURFACE`, and behind it, is moved onto it: its own
-/// surface does not shade it. Radiosity is E + rho H with the surface's own normal.
+/// surface does not shade it. Radiosity is E + rho H with the surface's own normal. When time runs out
+/// the points that have been looked at keep their values, and the others have none.
 pub fn probe(
     scene: &Scene,
     light: &Light,
@@ -29,11 +30,16 @@ pub fn probe(
     points
         .par_iter()
         .map_init(Walker::default, |walker, p| {
-            stage.advance(1)?;
+            match stage.advance(1) {
+                Err(Error::TimeLimit(_)) => {
+                    return Ok(ProbeResult { irradiance: None, radiosity: None });
+                }
+                other => other?,
+            }
             let foot = surface.at(p.position, p.normal, tolerance);
             let Some(foot) = foot else {
                 let irradiance = light.irradiance(walker, p.position, p.normal);
-                return Ok(ProbeResult { irradiance, radiosity: None });
+                return Ok(ProbeResult { irradiance: Some(irradiance), radiosity: None });
             };
             let face = &light.mesh.faces[foot.face as usize];
             let at = if foot.height < 0.0 { face.frame.lift(foot.x) } else { p.position };
@@ -47,7 +53,7 @@ pub fn probe(
             let triangle = face.triangle as usize;
             let radiosity = scene::exitance(scene, triangle, &[w; 3])
                 + scene::reflectance(scene, triangle, &[w; 3]) * own;
-            Ok(ProbeResult { irradiance, radiosity: Some(radiosity) })
+            Ok(ProbeResult { irradiance: Some(irradiance), radiosity: Some(radiosity) })
         })
         .collect()
 }

@@ -1,4 +1,4 @@
-//! Sparse gathering: many points of one root, few of them gathered.
+//! Sparse gathering: many points of one plane, few of them gathered.
 //!
 //! Light that is smooth need not be gathered at every texel or pixel. A triangle that holds many of
 //! the points asked for is sampled at the six nodes of a quadratic, then at the nine further nodes of
@@ -13,19 +13,23 @@ use rayon::prelude::*;
 use crate::error::Result;
 use crate::mesh::{Mesh, barycentric, child};
 use crate::monitor::Monitor;
+use crate::operator::ray_gather::Estimated;
 use crate::operator::walk::Walker;
 
 /// Points that are gathered rather than sampled for: what a check costs.
 const FEW: usize = 9;
 
+/// Fewer than these are gathered each, even where corners and middle of a triangle would do.
+const FEWEST: usize = 5;
+
 /// Most points of a task of its own.
 const TASK: usize = 1024;
 
-/// Most times that a root is cut for tasks, and then a task: points may coincide.
+/// Most times that a region is cut for tasks, and then a task: points may coincide.
 const DEEPEST_TASK: u32 = 20;
 const DEEPEST: u32 = 20;
 
-/// Nodes lie this share of a root's size inside it: on its rim other faces may touch it, from where
+/// Nodes lie this share of a region's size inside it: on its rim other faces may touch it, from where
 /// they would be seen edge on.
 const INSIDE: f64 = 1e-5;
 
@@ -38,6 +42,25 @@ pub struct RootPoints {
     pub points: Vec<DVec2>,
 }
 
+impl RootPoints {
+    /// The root with its points.
+    pub fn region(&self, mesh: &Mesh) -> Region {
+        let corners = mesh.roots[self.root as usize].corners;
+        Region { root: self.root, corners, points: self.points.clone() }
+    }
+}
+
+/// Points of one plane in a triangle of it, which is on the surface or mostly so.
+#[derive(Clone, Debug)]
+pub struct Region {
+    /// A root whose face's frame is that of the plane.
+    pub root: u32,
+    /// The triangle, counter-clockwise.
+    pub corners: [DVec2; 3],
+    /// Points in the plane, in the triangle or on it.
+    pub points: Vec<DVec2>,
+}
+
 /// What was done.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FillCounts {
@@ -45,7 +68,8 @@ pub struct FillCounts {
     pub points: u64,
     /// Points gathered: of those asked for, and nodes.
     pub gathered: u64,
-    /// Sum of the squares of the errors that the filled in points are expected to have, (W/m^2)^2.
+    /// Sum of the squares of the errors that the points are expected to have because they were filled
+    /// in or estimated, (W/m^2)^2.
     pub squares: DVec3,
     /// The most that an accepted check was off by, W/m^2: no filled in point is expected to be worse.
     pub largest: f64,
@@ -65,26 +89,25 @@ impl std::ops::AddAssign for FillCounts {
 /// the shipped scenes.
 const OF_CHECK: f64 = 0.3;
 
-/// Values at points, root by root in the order given: gathered, or filled in where the check finds
-/// no difference above `allowed` in any channel. With `allowed` 0 every point is gathered.
+/// Values at points, region by region in the order given: gathered, or filled in where the check finds
+/// no difference above `allowed` in any channel. With `allowed` 0 every point is gathered. Where
+/// `small`, regions of few points are filled in too, with a check in the middle only.
 ///
 /// `open` (root, triangle in its face's plane, what was made for a triangle around it) makes what
 /// points of a triangle share; `gather` (that, root, point) gathers. `most` says how many points of a
 /// triangle may be filled in at once: few where something small might lie between the nodes.
 pub fn fill<B>(
-    mesh: &Mesh,
-    asked: &[RootPoints],
-    allowed: f64,
+    asked: &[Region],
+    (allowed, small): (f64, bool),
     open: impl Fn(u32, &[DVec2; 3], Option<&B>) -> B + Sync,
-    gather: impl Fn(&mut Walker, &B, u32, DVec2) -> DVec3 + Sync,
+    gather: impl Fn(&mut Walker, &B, u32, DVec2) -> Estimated + Sync,
     most: impl Fn(&B) -> usize + Sync,
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
     let mut tasks: Vec<Task> = vec![];
     for (place, own) in asked.iter().enumerate() {
-        let corners = mesh.roots[own.root as usize].corners;
-        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let corners = corners.map(|x| x + INSIDE * (centre - x));
+        let centre = (own.corners[0] + own.corners[1] + own.corners[2]) / 3.0;
+        let corners = own.corners.map(|x| x + INSIDE * (centre - x));
         let points: Vec<Asked> =
             own.points.iter().enumerate().map(|(k, &x)| Asked { x, place: k as u32 }).collect();
         cut(Task { place, root: own.root, corners, points }, DEEPEST_TASK, &mut tasks);
@@ -93,7 +116,7 @@ pub fn fill<B>(
     let done: Vec<Done> = tasks
         .par_iter_mut()
         .map_init(Walker::default, |walker, task| {
-            let t = &mesh.roots[task.root as usize].corners;
+            let t = &asked[task.place].corners;
             let centre = (t[0] + t[1] + t[2]) / 3.0;
             let mut filler = Filler {
                 open: |corners: &[DVec2; 3], around: Option<&B>| {
@@ -106,6 +129,7 @@ pub fn fill<B>(
                 },
                 most: &most,
                 allowed,
+                small,
                 done: Done::default(),
             };
             let shared = (filler.open)(&task.corners, None);
@@ -187,6 +211,7 @@ struct Filler<O, G, M> {
     gather: G,
     most: M,
     allowed: f64,
+    small: bool,
     done: Done,
 }
 
@@ -194,9 +219,9 @@ struct Filler<O, G, M> {
 const WORTH_OPENING: usize = 6;
 
 impl<O, G, M> Filler<O, G, M> {
-    fn value<B>(&mut self, shared: &B, x: DVec2) -> Result<DVec3>
+    fn value<B>(&mut self, shared: &B, x: DVec2) -> Result<Estimated>
     where
-        G: FnMut(&B, DVec2) -> Result<DVec3>,
+        G: FnMut(&B, DVec2) -> Result<Estimated>,
     {
         self.done.gathered += 1;
         (self.gather)(shared, x)
@@ -204,13 +229,47 @@ impl<O, G, M> Filler<O, G, M> {
 
     fn each<B>(&mut self, shared: &B, points: &[Asked]) -> Result<()>
     where
-        G: FnMut(&B, DVec2) -> Result<DVec3>,
+        G: FnMut(&B, DVec2) -> Result<Estimated>,
     {
         for point in points {
             let value = self.value(shared, point.x)?;
-            self.done.values.push((point.place, value));
+            self.done.values.push((point.place, value.irradiance));
+            self.done.squares += value.spread * value.spread;
         }
         Ok(())
+    }
+
+    /// A few points from the corners and the middle of a triangle; whether that was right.
+    fn fan<B>(&mut self, corners: &[DVec2; 3], shared: &B, points: &[Asked]) -> Result<bool>
+    where
+        G: FnMut(&B, DVec2) -> Result<Estimated>,
+    {
+        let mut at = [DVec3::ZERO; 3];
+        let mut spread = DVec3::ZERO;
+        for (value, x) in at.iter_mut().zip(corners) {
+            let found = self.value(shared, *x)?;
+            *value = found.irradiance;
+            spread += found.spread * found.spread / 4.0;
+        }
+        let middle = self.value(shared, (corners[0] + corners[1] + corners[2]) / 3.0)?;
+        spread += middle.spread * middle.spread / 4.0;
+        let off = ((at[0] + at[1] + at[2]) / 3.0 - middle.irradiance).abs();
+        if off.max_element() > self.allowed {
+            return Ok(false);
+        }
+        self.done.largest = self.done.largest.max(off.max_element());
+        self.done.squares += points.len() as f64 * (OF_CHECK * OF_CHECK * off * off + spread);
+        for point in points {
+            // Linear from the middle to each side.
+            let w = barycentric(corners, point.x);
+            let least = w.min_element();
+            let value = (w.x - least) * at[0]
+                + (w.y - least) * at[1]
+                + (w.z - least) * at[2]
+                + 3.0 * least * middle.irradiance;
+            self.done.values.push((point.place, value));
+        }
+        Ok(true)
     }
 
     fn triangle<B>(
@@ -224,10 +283,14 @@ impl<O, G, M> Filler<O, G, M> {
     where
         M: Fn(&B) -> usize,
         O: FnMut(&[DVec2; 3], Option<&B>) -> B,
-        G: FnMut(&B, DVec2) -> Result<DVec3>,
+        G: FnMut(&B, DVec2) -> Result<Estimated>,
     {
         let cost = if six.is_some() { FEW } else { FEW + 6 };
         if points.len() <= cost || self.allowed == 0.0 || levels == 0 {
+            let fan = self.small && six.is_none() && points.len() > FEWEST;
+            if fan && self.fan(corners, shared, points)? {
+                return Ok(());
+            }
             return self.each(shared, points);
         }
         let [a, b, c] = *corners;
@@ -237,7 +300,7 @@ impl<O, G, M> Filler<O, G, M> {
                 let mut six = [DVec3::ZERO; 6];
                 let nodes = [a, b, c, 0.5 * (b + c), 0.5 * (c + a), 0.5 * (a + b)];
                 for (value, x) in six.iter_mut().zip(nodes) {
-                    *value = self.value(shared, x)?;
+                    *value = self.value(shared, x)?.irradiance;
                 }
                 six
             }
@@ -245,19 +308,21 @@ impl<O, G, M> Filler<O, G, M> {
         // The nine: on each side the quarter points (after the first corner, before the second),
         // and the midpoints of the inner triangle's sides.
         let mut nine = [DVec3::ZERO; 9];
-        let (mut worst, mut squares): (f64, DVec3) = (0.0, DVec3::ZERO);
+        let (mut worst, mut squares, mut spread) = (0.0f64, DVec3::ZERO, DVec3::ZERO);
         for (k, value) in nine.iter_mut().enumerate() {
             let w = NINE[k];
-            *value = self.value(shared, w.x * a + w.y * b + w.z * c)?;
+            let found = self.value(shared, w.x * a + w.y * b + w.z * c)?;
+            *value = found.irradiance;
             let off = (quadratic(&six, w) - *value).abs();
             worst = worst.max(off.max_element());
             squares += off * off / NINE.len() as f64;
+            spread += found.spread * found.spread / NINE.len() as f64;
         }
         let four = children(&six, &nine);
         let right = worst <= self.allowed;
         if right && points.len() <= (self.most)(shared) {
             self.done.largest = self.done.largest.max(worst);
-            self.done.squares += points.len() as f64 * OF_CHECK * OF_CHECK * squares;
+            self.done.squares += points.len() as f64 * (OF_CHECK * OF_CHECK * squares + spread);
             for point in points.iter() {
                 let k = part_of(corners, point.x);
                 let w = barycentric(&child(corners, k), point.x);
@@ -341,10 +406,11 @@ mod tests {
             }
         }
         let all = points.clone();
-        let gather = |_: &(), x| Ok(f(x));
+        let gather = |_: &(), x| Ok(Estimated::exactly(f(x)));
         let open = |_: &[DVec2; 3], _: Option<&()>| ();
         let most = |_: &()| usize::MAX;
-        let mut filler = Filler { open, gather, most, allowed, done: Done::default() };
+        let mut filler =
+            Filler { open, gather, most, allowed, small: false, done: Done::default() };
         filler.triangle(&T, &(), None, DEEPEST, &mut points).unwrap();
         assert_eq!(filler.done.values.len(), all.len());
         let off = |(place, value): &(u32, DVec3)| {

@@ -2,12 +2,14 @@
 
 use glam::{DVec2, DVec3};
 
-use super::fill::{FillCounts, RootPoints, fill};
+use super::fill::{FillCounts, Region, RootPoints, fill};
+use super::sheets::Sheets;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::operator::beam::{Beam, Patch};
 use crate::operator::gather::Radiant;
-use crate::solve::{ApartSource, Light, Reflected};
+use crate::operator::ray_gather::{Estimated, Sources};
+use crate::solve::{ApartSource, Light, RaySource, Reflected};
 
 /// Where light is filled in, what is checked may be off by this much, in units of the tolerance
 /// times the mean irradiance. What is filled in is about eight times better: the root mean square
@@ -22,7 +24,8 @@ const SHADED: usize = 32;
 /// What was done for direct and for indirect light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IrradianceCounts {
-    /// Emitted light that arrives straight away (all light, where a solution does not tell it apart).
+    /// Emitted light that arrives straight away; all light, where a solution does not tell it apart, or
+    /// where rays find both at once.
     pub direct: FillCounts,
     /// Reflected light.
     pub indirect: FillCounts,
@@ -61,6 +64,10 @@ pub fn irradiances(
     asked: &[RootPoints],
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, IrradianceCounts)> {
+    if let Some((source, rays, sources)) = of_rays(light) {
+        let (values, direct) = from_rays(light, source, rays, &sources, asked, monitor)?;
+        return Ok((values, IrradianceCounts { direct, ..IrradianceCounts::default() }));
+    }
     let (mut values, direct) = irradiances_of(light, Part::Direct, asked, monitor)?;
     if light.apart().is_none() {
         return Ok((values, IrradianceCounts { direct, ..IrradianceCounts::default() }));
@@ -94,29 +101,32 @@ pub fn irradiances_of(
             return Ok((zeros, FillCounts::default()));
         }
         let place = |root: u32, x: DVec2| {
-            let frame = &light.mesh.faces[light.mesh.roots[root as usize].face as usize].frame;
+            let frame = light.mesh.root_frame(root);
             (frame.lift(x), frame.n)
         };
         return fill(
-            &light.mesh,
-            asked,
-            0.0,
+            &regions(light, asked),
+            (0.0, false),
             |_, _, _| (),
             |walker, (), root, x| {
                 let (point, normal) = place(root, x);
-                light.irradiance(walker, point, normal)
+                Estimated::exactly(light.irradiance(walker, point, normal))
             },
             |()| usize::MAX,
             monitor,
         );
     };
-    let checked = CHECKED * source.tolerance * source.estimate.mean.max_element();
+    let checked = checked(source);
     match part {
         Part::Direct => {
+            if let Some((source, rays, sources)) = of_rays(light) {
+                let emitted = Sources { reflected: None, ..sources };
+                return from_rays(light, source, rays, &emitted, asked, monitor);
+            }
             let how = (source.allowed_direct, checked, SHADED);
             from_radiant(light, &source.emitters, how, asked, monitor)
         }
-        Part::Indirect => from_reflected(light, source, &source.reflected, checked, asked, monitor),
+        Part::Indirect => from_reflected(light, source, &source.reflected, asked, monitor),
     }
 }
 
@@ -126,10 +136,7 @@ pub fn changes(light: &Light, asked: &[RootPoints], monitor: &Monitor) -> Result
     let zero = || asked.iter().map(|own| vec![DVec3::ZERO; own.points.len()]).collect();
     let Some(source) = light.apart() else { return Ok(zero()) };
     let Some(coarser) = &source.coarser else { return Ok(zero()) };
-    let checked = CHECKED * source.tolerance * source.estimate.mean.max_element();
-    let from = |reflected| {
-        from_reflected(light, source, reflected, checked, asked, monitor).map(|(v, _)| v)
-    };
+    let from = |reflected| from_reflected(light, source, reflected, asked, monitor).map(|(v, _)| v);
     let (mut values, before) = (from(&source.reflected)?, from(coarser)?);
     for (value, before) in values.iter_mut().flatten().zip(before.into_iter().flatten()) {
         *value = (*value - before).abs();
@@ -137,34 +144,70 @@ pub fn changes(light: &Light, asked: &[RootPoints], monitor: &Monitor) -> Result
     Ok(values)
 }
 
+fn checked(source: &ApartSource) -> f64 {
+    CHECKED * source.tolerance * source.estimate.mean.max_element()
+}
+
+fn regions(light: &Light, asked: &[RootPoints]) -> Vec<Region> {
+    asked.iter().map(|own| own.region(&light.mesh)).collect()
+}
+
 fn from_reflected(
     light: &Light,
     source: &ApartSource,
     reflected: &Reflected,
-    checked: f64,
     asked: &[RootPoints],
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
-    match reflected {
-        Reflected::Cells(radiant) => {
-            let how = (source.allowed, checked, usize::MAX);
+    match (reflected, &source.rays) {
+        (Reflected::Cells(radiant), _) => {
+            let how = (source.allowed, checked(source), usize::MAX);
             from_radiant(light, radiant, how, asked, monitor)
         }
-        Reflected::Rays(_) => fill(
-            &light.mesh,
-            asked,
-            checked,
-            |_, _, _| (),
-            |walker, (), root, x| {
-                let face = light.mesh.roots[root as usize].face;
-                let frame = &light.mesh.faces[face as usize].frame;
-                let (point, stage) = (frame.lift(x), light.stage());
-                source.gather_reflected(reflected, walker, stage, point, frame.n)
-            },
-            |()| usize::MAX,
-            monitor,
-        ),
+        (Reflected::Rays(radiant), Some(rays)) => {
+            let sources = Sources { reflected: Some(radiant), emitted: None };
+            from_rays(light, source, rays, &sources, asked, monitor)
+        }
+        (Reflected::Rays(_), None) => {
+            let zeros = asked.iter().map(|own| vec![DVec3::ZERO; own.points.len()]).collect();
+            Ok((zeros, FillCounts::default()))
+        }
     }
+}
+
+/// What light that was solved for with rays is gathered from.
+fn of_rays(light: &Light) -> Option<(&ApartSource, &RaySource, Sources<'_>)> {
+    let source = light.apart()?;
+    let (Reflected::Rays(radiant), Some(rays)) = (&source.reflected, &source.rays) else {
+        return None;
+    };
+    Some((source, rays, Sources { reflected: Some(radiant), emitted: Some(&rays.lamps) }))
+}
+
+fn from_rays(
+    light: &Light,
+    source: &ApartSource,
+    rays: &RaySource,
+    sources: &Sources,
+    asked: &[RootPoints],
+    monitor: &Monitor,
+) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
+    let stage = light.stage();
+    let emitters = (&source.emitters, source.allowed_direct);
+    let sheets = Sheets::new(&light.mesh, asked);
+    let (values, counts) = fill(
+        &sheets.regions,
+        (checked(source), true),
+        |_, _, _| (),
+        |walker, (), root, x| {
+            let frame = light.mesh.root_frame(root);
+            let place = (frame.lift(x), frame.n);
+            rays.gather(sources, emitters, walker, stage, place, source.allowed)
+        },
+        |()| usize::MAX,
+        monitor,
+    )?;
+    Ok((sheets.in_order(asked, values), counts))
 }
 
 fn from_radiant(
@@ -175,11 +218,10 @@ fn from_radiant(
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
     let stage = light.stage();
-    let frame = |root: u32| &light.mesh.faces[light.mesh.roots[root as usize].face as usize].frame;
+    let frame = |root: u32| light.mesh.root_frame(root);
     fill(
-        &light.mesh,
-        asked,
-        checked,
+        &regions(light, asked),
+        (checked, false),
         |root, corners, around: Option<&Beam>| {
             let frame = frame(root);
             let patch = Patch::new(corners.map(|x| frame.lift(x)), frame.n);
@@ -190,7 +232,8 @@ fn from_radiant(
         },
         |walker, beam, root, x| {
             let frame = frame(root);
-            beam.gather(radiant, walker, stage, frame.lift(x), frame.n, allowed)
+            let point = frame.lift(x);
+            Estimated::exactly(beam.gather(radiant, walker, stage, point, frame.n, allowed))
         },
         |beam| if beam.is_clear() { usize::MAX } else { shaded },
         monitor,

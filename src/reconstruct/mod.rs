@@ -5,6 +5,7 @@
 
 pub mod fill;
 pub mod irradiance;
+mod sheets;
 mod surface;
 mod vertices;
 

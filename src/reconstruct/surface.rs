@@ -43,10 +43,7 @@ impl<'a> Surface<'a> {
     /// Prepares a meshed scene.
     pub fn new(scene: &'a Scene, mesh: &'a Mesh) -> Surface<'a> {
         let boxes: Vec<Bounds> = scene.triangles.iter().map(|t| Bounds::of(&t.vertices)).collect();
-        let mut sides = vec![[None; 2]; scene.triangles.len()];
-        for (i, face) in mesh.faces.iter().enumerate() {
-            sides[face.triangle as usize][usize::from(face.back)] = Some(i as u32);
-        }
+        let sides = mesh.sides(scene.triangles.len());
         Surface { scene, mesh, tree: BoxTree::build(&boxes), sides }
     }
 

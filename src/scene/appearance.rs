@@ -37,6 +37,14 @@ const SMOOTH: f64 = 2.0;
 /// The same for a texel that is a square of one colour.
 const SHARP: f64 = 8.0;
 
+/// Image coordinates beyond this hold no position in the image: 2^30 repeats, where steps of f64 are a
+/// 32nd of an eighth of a texel of the largest image. They count as zero.
+const FARTHEST: f64 = 1_073_741_824.0;
+
+/// Parts with a smaller share of the footprint are not cut further, however long they seem to be: far
+/// below what [`PARTS_OF_PRODUCT`] makes, reached only where rounding hides how long they are.
+const SMALLEST_SHARE: f64 = 1.0 / 1_048_576.0;
+
 /// Mean reflectance, in [0, [`MAX_REFLECTANCE`]], of the part of a triangle whose corners are
 /// given by barycentric coordinates with respect to its vertices.
 ///
@@ -111,7 +119,10 @@ impl<'a> Layer<'a> {
     fn of(scene: &'a Scene, triangle: &Triangle, used: &Option<TextureUse>) -> Option<Self> {
         let used = used.as_ref()?;
         let texture = scene.textures.get(used.texture)?;
-        let uv = triangle.uv.get(used.set)?.map(|uv| used.apply(uv));
+        let mut uv = triangle.uv.get(used.set)?.map(|uv| used.apply(uv));
+        if !uv.iter().all(|x| x.abs().max_element() < FARTHEST) {
+            uv = [DVec2::ZERO; 3];
+        }
         let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
         Some(Layer { texture, uv, wrap: used.wrap, nearest: used.nearest, level: 0, density: size })
     }
@@ -174,7 +185,7 @@ fn average<const N: usize>(
     while let Some(([a, b, c], share)) = parts.pop() {
         let edges = [length_squared(b - a), length_squared(c - b), length_squared(a - c)];
         let longest = edges[0].max(edges[1]).max(edges[2]);
-        if longest > 1.0 {
+        if longest > 1.0 && share > SMALLEST_SHARE {
             // Turn the corners so that the longest edge is the first.
             let [a, b, c] = match edges {
                 [e, _, _] if e == longest => [a, b, c],

@@ -20,7 +20,7 @@ use super::gltf_mesh::{self, MaterialId};
 use super::gltf_nodes::{self, Placed};
 use super::limits::MAX_TRIANGLES;
 use super::notices::Notices;
-use super::{Object, Scene, Triangle, gltf_guard};
+use super::{Object, Scene, Triangle, gltf_guard, gltf_index, uri};
 use crate::error::{Error, Result};
 
 /// A glTF document with its bytes.
@@ -68,6 +68,13 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
     };
     let root = json::Root::from_slice(&parts.json).map_err(bad_json)?;
     let exact: Exact = serde_json::from_slice(&parts.json).map_err(bad_json)?;
+    if let Some((member, number)) = gltf_index::too_large(&parts.json).map_err(bad_json)? {
+        return Err(Error::invalid(
+            path,
+            format!("member \"{member}\""),
+            format!("{number} is too large; the file is damaged, export it again"),
+        ));
+    }
     let mut source = Source { path, root: &root, exact: &exact, buffers: Vec::new() };
     let mut notices = Notices::default();
     gltf_guard::check(&source, &mut notices)?;
@@ -97,6 +104,9 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
     scene.materials = materials.list;
     scene.textures = materials.textures;
     scene.notices = notices.into_list();
+    let buffers = root.buffers.iter().filter_map(|b| b.uri.as_deref());
+    let images = root.images.iter().filter_map(|i| i.uri.as_deref());
+    scene.files = buffers.chain(images).filter_map(|uri| uri::file_of(path, uri)).collect();
     Ok(scene)
 }
 

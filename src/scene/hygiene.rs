@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::limits::is_position;
+use super::limits::{MAX_RADIANCE, is_position, triple};
 use super::notices::Notices;
 use super::{Scene, Triangle};
 use crate::error::{Error, Result};
@@ -28,7 +28,8 @@ const MIN_RELATIVE_HEIGHT: f64 = 1e-12;
 ///
 /// # Errors
 ///
-/// [`Error::Invalid`] for a corner that is not a usable position, or when no triangle is left.
+/// [`Error::Invalid`] for a corner that is not a usable position, for emission beyond reason, or when
+/// no triangle is left.
 pub(crate) fn clean(scene: &mut Scene) -> Result<()> {
     for triangle in &scene.triangles {
         if !triangle.vertices.iter().all(|&p| is_position(p)) {
@@ -36,6 +37,20 @@ pub(crate) fn clean(scene: &mut Scene) -> Result<()> {
                 &scene.path,
                 about(scene, triangle.object),
                 "a corner is not finite or beyond 1e30 m; check the transforms above it",
+            ));
+        }
+    }
+    for material in &scene.materials {
+        // What is not a number is not below it either.
+        if !material.radiance.to_array().iter().all(|x| *x <= MAX_RADIANCE) {
+            return Err(Error::invalid(
+                &scene.path,
+                format!("material \"{}\"", material.name),
+                format!(
+                    "its emission {} is beyond {MAX_RADIANCE:e} W/(m^2 sr); correct it in the file, or \
+                     set it with --emission or --light-scale",
+                    triple(material.radiance)
+                ),
             ));
         }
     }

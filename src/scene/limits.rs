@@ -27,6 +27,10 @@ pub(crate) const MAX_IMAGE_TEXELS: u64 = 1 << 26;
 /// Most texels in all images of a scene (3 GiB when decoded).
 pub(crate) const MAX_SCENE_TEXELS: u64 = 1 << 28;
 
+/// Largest radiance of any channel, W/(m^2 sr). Exitances, and squares of them in norms, stay finite in
+/// f64 below this, and pixels in f32: the sun has 2e7.
+pub(crate) const MAX_RADIANCE: f64 = 1e30;
+
 /// Whether a point may be used as a position.
 pub(crate) fn is_position(p: DVec3) -> bool {
     p.is_finite() && p.abs().max_element() < MAX_COORDINATE

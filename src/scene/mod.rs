@@ -27,6 +27,7 @@ mod gltf_buffers;
 mod gltf_exact;
 mod gltf_file;
 mod gltf_guard;
+mod gltf_index;
 mod gltf_material;
 mod gltf_mesh;
 mod gltf_nodes;
@@ -65,6 +66,8 @@ pub use winding::DISAGREES;
 pub struct Scene {
     /// The file that it was read from.
     pub path: PathBuf,
+    /// All files that it was read from: that one, buffers, images, material libraries.
+    pub files: Vec<PathBuf>,
     /// Named things that triangles belong to: a glTF node with a mesh, an OBJ object or group.
     pub objects: Vec<Object>,
     /// Materials; every triangle's index is valid.

@@ -27,6 +27,8 @@ pub(crate) struct Library<'a> {
     path: &'a Path,
     pub(crate) list: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
+    /// Files read: libraries and images.
+    pub(crate) files: Vec<PathBuf>,
     numbers: HashMap<String, usize>,
     decoded: BTreeMap<PathBuf, usize>,
     texels: u64,
@@ -39,6 +41,7 @@ impl<'a> Library<'a> {
             path,
             list: Vec::new(),
             textures: Vec::new(),
+            files: Vec::new(),
             numbers: HashMap::new(),
             decoded: BTreeMap::new(),
             texels: 0,
@@ -84,6 +87,7 @@ impl<'a> Library<'a> {
     }
 
     fn read(&mut self, file: &Path, bytes: &[u8], notices: &mut Notices) -> Result<()> {
+        self.files.push(file.to_path_buf());
         let text = plain(file, bytes, notices)?;
         let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())
             .map_err(|e| Error::invalid(file, "materials", e))?;
@@ -178,6 +182,7 @@ impl<'a> Library<'a> {
                 let texture = texture::decode(&bytes, map.name, Encoding::Srgb).map_err(fail)?;
                 self.textures.push(texture);
                 self.decoded.insert(found.clone(), self.textures.len() - 1);
+                self.files.push(found);
                 self.textures.len() - 1
             }
         };

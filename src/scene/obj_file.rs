@@ -58,6 +58,7 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
     }
     scene.materials = library.list;
     scene.textures = library.textures;
+    scene.files = library.files;
     scene.notices = notices.into_list();
     drop_empty_first_object(&mut scene);
     Ok(scene)

@@ -62,6 +62,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Scene> {
         }
     };
     scene.path = path.to_path_buf();
+    scene.files.insert(0, path.to_path_buf());
     overrides::apply(&mut scene, options)?;
     hygiene::clean(&mut scene)?;
     winding::check(&mut scene);

@@ -35,15 +35,28 @@ pub(crate) fn read_relative(scene: &Path, uri: &str) -> Result<Vec<u8>, Refused>
             "\"{uri}\" is an absolute path; refer to the file by a path relative to the scene"
         )));
     }
-    let folder = scene.parent().unwrap_or(Path::new(""));
-    let path = folder.join(percent_decode(uri));
+    let [path, as_it_is] = places(scene, uri);
     match read_regular(&path) {
         Ok(bytes) => Ok(bytes),
-        // Some exporters write file names as they are, percent signs and all.
-        Err(reason) => read_regular(&folder.join(uri)).map_err(|_| {
+        Err(reason) => read_regular(&as_it_is).map_err(|_| {
             Refused::Unreadable(path, format!("{reason}; put the file there, beside the scene"))
         }),
     }
+}
+
+/// Where the file may be that a glTF URI refers to, the likelier place first: some exporters write
+/// file names as they are, percent signs and all.
+fn places(scene: &Path, uri: &str) -> [PathBuf; 2] {
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    [folder.join(percent_decode(uri)), folder.join(uri)]
+}
+
+/// The file that [`read_relative`] would read; none for a URI that holds its data itself.
+pub(crate) fn file_of(scene: &Path, uri: &str) -> Option<PathBuf> {
+    if uri.starts_with("data:") {
+        return None;
+    }
+    places(scene, uri).into_iter().find(|place| place.is_file())
 }
 
 /// The scheme of a URI such as `https:` or `C:`, if it has one (RFC 3986, section 3.1).

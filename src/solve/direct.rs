@@ -19,6 +19,7 @@ use glam::{DVec2, DVec3};
 use crate::cluster::adaptive::{AdaptiveTree, Field};
 use crate::cluster::fit::{Fit, join, mismatch, split};
 use crate::error::{Error, Result};
+use crate::geometry::triangle_area;
 use crate::mesh::{Basis, Face, Mesh, child};
 use crate::monitor::Monitor;
 use crate::operator::gather::Radiant;
@@ -60,8 +61,7 @@ const DARK: DirectCell =
 
 /// Area of all roots, square metres.
 pub fn surface_area(mesh: &Mesh) -> f64 {
-    let area = |t: &[DVec2; 3]| 0.5 * (t[1] - t[0]).perp_dot(t[2] - t[0]);
-    mesh.roots.iter().map(|r| area(&r.corners)).sum()
+    mesh.roots.iter().map(|r| triangle_area(&r.corners)).sum()
 }
 
 /// What the nodes of a cell stand for: the child triangles around them, as weights of the corners of
@@ -142,9 +142,8 @@ fn small(
     surface: f64,
     allowed: f64,
 ) -> bool {
-    let area = 0.5 * (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]);
     let square = mismatch(fit, four).into_iter().fold(0.0, f64::max);
-    square * area <= allowed * allowed * surface
+    square * triangle_area(corners) <= allowed * allowed * surface
 }
 
 fn times(a: &Fit<3>, b: &Fit<3>) -> Fit<3> {

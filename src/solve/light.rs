@@ -9,10 +9,12 @@ use crate::cluster::Clusters;
 use crate::error::{Error, Result};
 use crate::mesh::{self, Mesh, MeshOptions};
 use crate::monitor::Monitor;
-use crate::operator::bundles::{RayCounts, RayRadiant, RayScene};
+use crate::operator::bundles::RayScene;
 use crate::operator::clustered::ClusteredSource;
 use crate::operator::fast::FitSource;
 use crate::operator::gather::Radiant;
+use crate::operator::lamps::Lamps;
+use crate::operator::ray_gather::{Estimated, RayCounts, RayRadiant, Sources};
 use crate::operator::walk::{Stage, Walker, gather};
 use crate::operator::{Operator, OperatorKind};
 use crate::scene::Scene;
@@ -81,6 +83,20 @@ pub enum Reflected {
     Rays(RayRadiant),
 }
 
+/// What gathering by rays needs.
+pub struct RaySource {
+    /// What rays meet.
+    pub scene: RayScene,
+    /// What emits.
+    pub lamps: Lamps,
+    /// How many rays are cast.
+    pub counts: RayCounts,
+    /// Share of the mean irradiance that is reflected light: what rays estimate at least.
+    pub share: f64,
+    /// What they are off by at the samples, root mean square, relative to the mean irradiance.
+    pub error: f64,
+}
+
 /// A solution with direct light apart, made to a tolerance.
 pub struct ApartSource {
     /// What emits: E.
@@ -89,8 +105,8 @@ pub struct ApartSource {
     pub reflected: Reflected,
     /// The same from the next coarser mesh, where there was one: what changed tells the error.
     pub coarser: Option<Reflected>,
-    /// What rays meet and how many are cast, where reflected light is gathered by them.
-    pub rays: Option<(RayScene, RayCounts)>,
+    /// Where reflected light is gathered by rays.
+    pub rays: Option<RaySource>,
     /// Errors that a cell may make in gathering reflected light, W/m^2.
     pub allowed: f64,
     /// Those in gathering emitted light.
@@ -191,6 +207,46 @@ pub(super) fn row_sums(operator: &Operator, mesh: &Mesh, receives: &[bool]) -> (
         .fold((f64::MAX, f64::MIN), |(a, b), (_, &s)| (a.min(s), b.max(s)))
 }
 
+/// A face that emits costs as much exactly as about so many rays and points of what emits.
+const EXACT: u32 = 512;
+
+impl RaySource {
+    /// Irradiance from some `sources` at a point with a unit normal, with a spread of at most
+    /// `allowed` (W/m^2). Emitted light is gathered exactly (from `emitters`, whose cells may make
+    /// the error given with them) where that costs no more than the rays that it would take.
+    pub fn gather(
+        &self,
+        sources: &Sources,
+        (emitters, allowed_direct): (&Radiant, f64),
+        walker: &mut Walker,
+        stage: Stage,
+        place: (DVec3, DVec3),
+        allowed: f64,
+    ) -> Estimated {
+        let scene = (&self.scene, stage.mesh);
+        if sources.emitted.is_none() {
+            return sources.gather(walker, scene, place, allowed, self.counts);
+        }
+        // As many points of what emits are looked at as rays are cast.
+        let least = (self.counts.least / 2).max(8);
+        let most = EXACT.saturating_mul(self.lamps.len() as u32).next_power_of_two();
+        if least <= most && self.lamps.are_even() {
+            let counts = RayCounts { least, most: most.min(self.counts.most) };
+            let found = sources.gather(walker, scene, place, allowed, counts);
+            if found.is_within(allowed) {
+                return found;
+            }
+        }
+        let direct = emitters.gather(walker, stage, place.0, place.1, allowed_direct);
+        if sources.reflected.is_none() {
+            return Estimated::exactly(direct);
+        }
+        let reflected = Sources { emitted: None, ..*sources };
+        let more = reflected.gather(walker, scene, place, allowed, self.counts);
+        Estimated { irradiance: direct + more.irradiance, spread: more.spread }
+    }
+}
+
 impl ApartSource {
     /// Irradiance from `reflected` light (of this solution or the coarser one) at a point.
     pub fn gather_reflected(
@@ -205,9 +261,10 @@ impl ApartSource {
             (Reflected::Cells(radiant), _) => {
                 radiant.gather(walker, stage, point, normal, self.allowed)
             }
-            (Reflected::Rays(radiant), Some((rays, counts))) => {
-                let scene = (rays, stage.mesh);
-                radiant.gather(walker, scene, (point, normal), self.allowed, *counts).irradiance
+            (Reflected::Rays(radiant), Some(rays)) => {
+                let sources = Sources { reflected: Some(radiant), emitted: None };
+                let (scene, place) = ((&rays.scene, stage.mesh), (point, normal));
+                sources.gather(walker, scene, place, self.allowed, rays.counts).irradiance
             }
             (Reflected::Rays(_), None) => DVec3::ZERO,
         }

@@ -1,28 +1,27 @@
 //! Light of scenes of many small faces, to a tolerance.
 //!
-//! Emitted light is gathered exactly. What is reflected is the radiosity of patches
-//! ([`crate::operator::patches`]), and irradiance from it a mean over bundles of rays
-//! ([`crate::operator::bundles`]): each face of such a scene fills little of any hemisphere. The
-//! error has two parts: that of the bundles, known from their halves, and that of the patches, known
+//! Emitted light is gathered exactly, or by rays where few of them tell enough. What is reflected
+//! is the radiosity of patches ([`crate::operator::patches`]), and irradiance from it a mean over
+//! bundles of rays ([`crate::operator::bundles`]): each face of such a scene fills little of any
+//! hemisphere. The error has two parts: that of the bundles, known from their halves, and that of the patches, known
 //! from what changes when they are made smaller.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::direct::emission;
-use super::light::{ApartSource, Light, Reflected, Source};
+use super::light::{ApartSource, Light, RaySource, Reflected, Source};
 use super::samples::{Sample, samples};
-use super::within::{
-    Estimate, gathered, largest, mean_emission, of_change, relative, rms, share, why_not,
-};
+use super::within::{Estimate, largest, mean_emission, of_change, relative, rms, share, why_not};
 use super::{Solution, SolveOptions, WithinOptions, gmres};
 use crate::cluster::Clusters;
 use crate::error::{Error, Result};
 use crate::mesh::{self, Mesh};
 use crate::monitor::Monitor;
-use crate::operator::bundles::{Estimated, RayCounts, RayRadiant, RayScene, Rows};
+use crate::operator::bundles::{RayScene, Rows};
 use crate::operator::lamps::{Lamps, Samples};
 use crate::operator::patches::{PatchSizes, Patches};
+use crate::operator::ray_gather::{Estimated, RayCounts, RayRadiant, Sources};
 use crate::operator::walk::{Stage, Walker};
 use crate::scene::Scene;
 use crate::visibility::Occluders;
@@ -100,14 +99,27 @@ pub fn light_of_many(
     let unit = options.tolerance * emitted.max_element();
     let emitters = emission(scene, stage, share::DIRECT * unit, max_memory, monitor)?;
     let at = samples(&base);
-    let direct = gathered(stage, &emitters, &at, share::EMITTER * unit, monitor)?;
-    let lamps = Lamps::new(scene, &base);
-    let rays_scene = RayScene::new(scene, &base);
+    let mut rays = RaySource {
+        scene: RayScene::new(scene, &base),
+        lamps: Lamps::new(scene, &base),
+        counts: ladder_counts(options.tolerance),
+        share: 0.0,
+        error: 0.0,
+    };
+    let sources = Sources { reflected: None, emitted: Some(&rays.lamps) };
+    let direct: Vec<DVec3> = at
+        .par_iter()
+        .map_init(Walker::default, |walker, s| {
+            monitor.check()?;
+            let (how, place) = ((&emitters, share::EMITTER * unit), (s.point, s.normal));
+            let allowed = share::GATHER * unit;
+            Ok(rays.gather(&sources, how, walker, stage, place, allowed).irradiance)
+        })
+        .collect::<Result<_>>()?;
     let ladder = Ladder {
         scene,
         stage,
-        rays: &rays_scene,
-        lamps: &lamps,
+        rays: &rays,
         samples: &at,
         direct: &direct,
         emitted,
@@ -115,7 +127,8 @@ pub fn light_of_many(
         monitor,
     };
     let (reached, why) = ladder.climb()?;
-    let Reached { step, coarser, estimate, .. } = reached;
+    let Reached { step, coarser, estimate, share: reflected, spread, .. } = reached;
+    (rays.share, rays.error) = (reflected, spread);
     let met = estimate.rms <= options.tolerance;
     let out_of_time = matches!(why, Some(Error::TimeLimit(_)));
     let allowed = share::GATHER * options.tolerance * estimate.mean.max_element();
@@ -142,7 +155,7 @@ pub fn light_of_many(
         emitters,
         reflected: Reflected::Rays(step.radiant),
         coarser: coarser.map(Reflected::Rays),
-        rays: Some((rays_scene, ladder_counts(options.tolerance))),
+        rays: Some(rays),
         allowed,
         allowed_direct: share::EMITTER / share::GATHER * allowed,
         estimate,
@@ -175,8 +188,7 @@ fn ladder_counts(tolerance: f64) -> RayCounts {
 struct Ladder<'a> {
     scene: &'a Scene,
     stage: Stage<'a>,
-    rays: &'a RayScene,
-    lamps: &'a Lamps,
+    rays: &'a RaySource,
     samples: &'a [Sample],
     direct: &'a [DVec3],
     emitted: DVec3,
@@ -191,6 +203,10 @@ struct Reached {
     at_samples: Vec<DVec3>,
     changes: Vec<f64>,
     estimate: Estimate,
+    /// Of reflected light in the mean irradiance, of the channels the largest.
+    share: f64,
+    /// What rays are off by at the samples.
+    spread: f64,
 }
 
 impl Ladder<'_> {
@@ -231,15 +247,16 @@ impl Ladder<'_> {
             None => self.emitted,
         };
         let allowed = share::GATHER * tolerance * mean.max_element();
-        let counts = ladder_counts(tolerance);
         let mesh = self.stage.mesh;
+        let sources = Sources { reflected: Some(&step.radiant), emitted: None };
         let found: Vec<Estimated> = self
             .samples
             .par_iter()
             .map_init(Walker::default, |walker, s| {
                 self.monitor.check()?;
                 let place = (s.point, s.normal);
-                Ok(step.radiant.gather(walker, (self.rays, mesh), place, allowed, counts))
+                let scene = (&self.rays.scene, mesh);
+                Ok(sources.gather(walker, scene, place, allowed, self.rays.counts))
             })
             .collect::<Result<_>>()?;
         let at_samples: Vec<DVec3> = found.iter().map(|e| e.irradiance).collect();
@@ -264,22 +281,17 @@ impl Ladder<'_> {
         if before.is_some() {
             changes.push(change);
         }
-        let reduction = match changes[..] {
-            [first, .., last] if first > 0.0 && last > 0.0 => {
-                (first / last).powf(1.0 / (changes.len() - 1) as f64)
-            }
-            _ => f64::NAN,
-        };
-        let of_change = of_change(reduction).max(OF_CHANGE);
+        let of_change = of_change(&changes).max(OF_CHANGE);
+        let off = rms(&spread, self.samples);
         let (error, maximum) = match mean == DVec3::ZERO {
             true => (0.0, 0.0),
-            false => (
-                (of_change * change).hypot(rms(&spread, self.samples)),
-                2.0 * (largest(&local) + largest(&spread)),
-            ),
+            false => ((of_change * change).hypot(off), 2.0 * (largest(&local) + largest(&spread))),
         };
         let estimate = Estimate { rms: error, maximum, mean, of_change, steps: number + 1 };
-        Ok(Reached { step, coarser: None, at_samples, changes, estimate })
+        let reflected: DVec3 =
+            at_samples.iter().zip(self.samples).map(|(w, s)| s.weight * *w).sum();
+        let share = relative(reflected, mean).max_element();
+        Ok(Reached { step, coarser: None, at_samples, changes, estimate, share, spread: off })
     }
 
     /// Solves on patches: the first ones, or those of the solution `before` split where its light
@@ -288,7 +300,7 @@ impl Ladder<'_> {
         let mesh = self.stage.mesh;
         let tolerance = self.options.tolerance;
         let square = FIRST_SQUARE * mesh.bounds.extent();
-        let patches = match before {
+        let mut patches = match before {
             None => {
                 let sizes = PatchSizes { square, cube: CUBE * square };
                 Patches::build(self.scene, mesh, &sizes)?
@@ -303,8 +315,8 @@ impl Ladder<'_> {
             rays: rays(share_of_rays * RAYS_OF_SPOT, tolerance),
         };
         let max_memory = self.options.max_memory;
-        let lamps = (self.lamps, samples);
-        let rows = Rows::cast(self.rays, mesh, &patches, lamps, max_memory, self.monitor)?;
+        let (scene, lamps) = (&self.rays.scene, (&self.rays.lamps, samples));
+        let rows = Rows::cast(scene, mesh, &mut patches, lamps, max_memory, self.monitor)?;
         let mean_direct = rows.means(&patches, &rows.direct);
         let begin: Vec<[f64; 3]> = times(&mean_direct, &patches.reflectance);
         let apply = |u: &[[f64; 3]], out: &mut [[f64; 3]]| {

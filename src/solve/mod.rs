@@ -19,7 +19,7 @@ use crate::operator::Operator;
 
 pub use colours::Colours;
 pub use gmres::gmres;
-pub use light::{ApartSource, Light, LightOptions, Reflected};
+pub use light::{ApartSource, Light, LightOptions, RaySource, Reflected};
 pub use within::{Estimate, Way, WithinOptions, light_within};
 
 /// When to stop.

@@ -8,6 +8,7 @@
 use glam::{DVec2, DVec3};
 
 use super::direct::surface_area;
+use crate::geometry::triangle_area;
 use crate::mesh::Mesh;
 
 /// A point of the surface.
@@ -40,7 +41,7 @@ pub fn samples(mesh: &Mesh) -> Vec<Sample> {
         let (mut before, mut made) = (0.0, 0);
         for root in &mesh.roots {
             let t = &root.corners;
-            let area = 0.5 * (t[1] - t[0]).perp_dot(t[2] - t[0]);
+            let area = triangle_area(t);
             let after = before + area * count as f64 / total;
             let middle = (t[0] + t[1] + t[2]) / 3.0;
             let frame = &mesh.faces[root.face as usize].frame;

@@ -20,6 +20,7 @@ use super::many::{is_many, light_of_many};
 use super::samples::{Sample, samples};
 use crate::cluster::Clusters;
 use crate::error::{Error, Result};
+use crate::geometry::triangle_area;
 use crate::mesh::{self, Basis, Mesh, MeshOptions, Refinement};
 use crate::monitor::Monitor;
 use crate::operator::gather::Radiant;
@@ -125,18 +126,23 @@ pub struct Estimate {
     pub steps: u32,
 }
 
-/// Error of the finer of two solutions over their difference, when steps divide errors by
-/// `reduction`: 1/(reduction - 1), with a margin. Not a number before that has been seen: then the
-/// coarser one was from the coarsest mesh, and worse than it has to be.
-pub(super) fn of_change(reduction: f64) -> f64 {
+/// Error of the finest solution over its difference from the one before, of solutions that changed
+/// so much from step to step: 1/(r - 1) with a margin, where each step divides errors by r. One
+/// change alone does not tell r: then the coarser solution was from the coarsest mesh, and worse
+/// than it has to be.
+pub(super) fn of_change(changes: &[f64]) -> f64 {
     const MARGIN: f64 = 1.3;
     const FIRST: f64 = 0.5;
     /// Never less, however fast errors seem to fall: along rims they fall slowly, and are last to go.
     /// Never more, since steps with four times the elements do divide them.
     const BELIEVED: (f64, f64) = (0.7, 3.0);
-    if reduction.is_nan() {
-        return FIRST;
-    }
+    // The mean of all steps: single ones jump about.
+    let reduction = match *changes {
+        [first, .., last] if first > 0.0 && last > 0.0 => {
+            (first / last).powf(1.0 / (changes.len() - 1) as f64)
+        }
+        _ => return FIRST,
+    };
     (MARGIN / (reduction.max(1.0) - 1.0)).clamp(BELIEVED.0, BELIEVED.1)
 }
 
@@ -358,14 +364,7 @@ impl Ladder<'_> {
         if before.is_some() {
             changes.push(change);
         }
-        // The mean of all steps: single ones jump about.
-        let reduction = match changes[..] {
-            [first, .., last] if first > 0.0 && last > 0.0 => {
-                (first / last).powf(1.0 / (changes.len() - 1) as f64)
-            }
-            _ => f64::NAN,
-        };
-        let of_change = of_change(reduction);
+        let of_change = of_change(&changes);
         // A spot of light may lie between all nodes of the first meshes.
         let dark_for_good = self.emission == DVec3::ZERO || step >= DARK_FOR_GOOD;
         let (error, most) = match mean == DVec3::ZERO {
@@ -448,15 +447,14 @@ pub(super) fn largest(off: &[DVec3]) -> f64 {
 pub(super) fn mean_emission(mesh: &Mesh, emitters: &Radiant) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for (root, fit) in mesh.roots.iter().zip(&emitters.field.fits) {
-        let [a, b, c] = root.corners;
         let mean = fit.iter().map(|v| DVec3::from_array(*v)).sum::<DVec3>() / 3.0;
-        sum += 0.5 * (b - a).perp_dot(c - a) * mean;
+        sum += triangle_area(&root.corners) * mean;
     }
     let area = surface_area(mesh);
     if area > 0.0 { sum / area } else { DVec3::ZERO }
 }
 
-pub(super) fn gathered(
+fn gathered(
     stage: Stage,
     radiant: &Radiant,
     samples: &[Sample],

@@ -28,6 +28,7 @@ use crate::cluster::fit::{Deviation, Fit, fits};
 use crate::error::{Error, Result};
 use crate::far::Interpolation;
 use crate::far::interpolation::DIRECT_LEVELS;
+use crate::geometry::triangle_area;
 use crate::kernel::Precision;
 use crate::mesh::{Mesh, Root};
 use crate::monitor::Monitor;
@@ -357,8 +358,7 @@ impl<'a> FastOperator<'a> {
                 let cluster = &slots.clusters[slot];
                 if level <= DIRECT_LEVELS {
                     let root = &mesh.roots[cluster.root as usize];
-                    let [a, b, c] = root.corners;
-                    let area = 0.5 * (b - a).perp_dot(c - a) * 0.25f64.powi(cluster.depth as i32);
+                    let area = triangle_area(&root.corners) * 0.25f64.powi(cluster.depth as i32);
                     let first = (root.first + (cluster.index << (2 * level))) as usize * basis;
                     let u = &u[first..][..basis << (2 * level)];
                     self.interpolation.add_moments(level, area, u, moments);
