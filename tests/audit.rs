@@ -276,7 +276,7 @@ fn a_lamp_before_a_black_back_is_found() {
 #[test]
 fn scenes_without_light_are_errors() {
     let nothing = findings(&Scene::default());
-    assert!(!nothing.is_empty() && nothing.iter().all(|f| f.kind == Kind::Darkness));
+    is(&nothing[0], Severity::Error, Kind::Darkness, "scene");
     let dark = only(&scene(&[("Room", walls(), WALL)]));
     is(&dark, Severity::Error, Kind::Darkness, "scene");
     assert!(dark.text.contains("emits") && dark.remedy.contains("--emission"));
@@ -419,6 +419,7 @@ fn shipped_scenes_are_sound() {
         ("paper.gltf", Enclosure::Open),
         ("room.gltf", Enclosure::Closed),
         ("furnace.gltf", Enclosure::Closed),
+        ("arcade.gltf", Enclosure::Closed),
     ] {
         let scene = read(&shipped(name), &ReadOptions::default()).unwrap();
         let found = audited(&scene);
@@ -426,6 +427,27 @@ fn shipped_scenes_are_sound() {
         let wanted: &[Kind] = if enclosure == Enclosure::Open { &[Kind::Open] } else { &[] };
         let kinds: Vec<Kind> = found.findings.iter().map(|f| f.kind).collect();
         assert_eq!(kinds, wanted, "{name}: {:#?}", found.findings);
+    }
+}
+
+#[test]
+fn defects_made_on_purpose_are_found() {
+    let scene = read(&shipped("arcade-defects.glb"), &ReadOptions::default()).unwrap();
+    let found = findings(&scene);
+    let (warnings, notes): (Vec<_>, Vec<_>) =
+        found.iter().partition(|f| f.severity != Severity::Note);
+    let [turned, winding, buried] = &warnings[..] else { panic!("{warnings:#?}") };
+    is(turned, Severity::Warning, Kind::Flipped, "\"defect_crate_inside_out\"");
+    is(winding, Severity::Warning, Kind::Winding, "\"defect_pot_some_flipped\"");
+    is(buried, Severity::Warning, Kind::Buried, "\"defect_box_within\"");
+    assert!(buried.text.contains("\"defect_crate_around\""), "{}", buried.text);
+    for (about, text) in [
+        ("defect_crate_twice", "duplicate triangles"),
+        ("defect_crate_zero_area", "without area"),
+        ("defect_rug_on_floor", "in the same plane cover them"),
+    ] {
+        let is_it = |f: &&Finding| f.about.contains(about) && f.text.contains(text);
+        assert!(notes.iter().any(is_it), "{about}: {notes:#?}");
     }
 }
 

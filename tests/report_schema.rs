@@ -134,7 +134,7 @@ fn every_report_fits_the_schema() {
     let mut seen = vec![];
     for words in [
         "inspect scenes/room.gltf --two-sided --time-limit 60 --threads 1",
-        "inspect scenes/cornell.gltf --emission *=0 --subdivide 1",
+        "inspect scenes/cornell.gltf --emission *=0 --subdivide 1 --audit",
         "render scenes/cornell.gltf -o v.png --size 16x16 --error-map e.exr",
         "render scenes/paper.gltf -o v.exr --size 16x16 --max-edge 2 --camera low",
         "render scenes/paper.gltf -o v.exr --size 16x16 --subdivide 1 --operator exact",

@@ -1,7 +1,8 @@
 //! Things inside of others.
 //!
-//! More than half of the rays from a point first meet sides that do not radiate (not counting those
-//! of turned objects): it lies inside of something, and no light comes there.
+//! A point is buried if more than half of its rays first meet sides that do not radiate, not counting
+//! those of turned parts. A part lies inside of something if half of it is buried, and no light comes
+//! to any of it ([`super::light`]).
 
 use std::collections::BTreeMap;
 
@@ -9,17 +10,20 @@ use glam::DVec3;
 
 use super::Surveyed;
 use super::finding::{Finding, Kind, Severity, largest_first, percent, two_figures};
+use super::light;
 use super::look::{Look, Met};
+use crate::error::Result;
+use crate::monitor::Monitor;
 
 /// Share of black backs among what a buried point meets.
 const ENCLOSED: f64 = 0.5;
 
-/// An object lies inside of something if this share of its area does: rims may stick out.
-const WHOLLY: f64 = 0.9;
-
-/// What lies inside is worth a line if it is this share of an object's area: what stands on a floor or
-/// in a wall covers less of it.
+/// What is buried is worth a look if it is this share of the area: what stands on a floor or in a wall
+/// covers less of it.
 const MENTIONED: f64 = 0.5;
+
+/// Where there is no light at all, a part lies inside of something if this share of it is buried.
+const WHOLLY: f64 = 0.9;
 
 /// What an object, or one of its parts, has inside of other things.
 #[derive(Default)]
@@ -49,7 +53,7 @@ pub(super) fn is_buried(survey: &Surveyed, look: &Look, turned: &[bool]) -> bool
 
 /// Objects, and parts of them, inside of others. Those that emit are left to
 /// [`super::emitters`].
-pub(super) fn find(survey: &Surveyed, turned: &[bool]) -> Vec<Finding> {
+pub(super) fn find(survey: &Surveyed, turned: &[bool], monitor: &Monitor) -> Result<Vec<Finding>> {
     let parts = survey.parts;
     let mut of_object: BTreeMap<u32, Inside> = BTreeMap::new();
     let mut of_part: Vec<[f64; 2]> = vec![[0.0; 2]; parts.len()];
@@ -74,21 +78,29 @@ pub(super) fn find(survey: &Surveyed, turned: &[bool]) -> Vec<Finding> {
     }
     let mut findings = vec![];
     let members = parts.of_objects(survey.scene.objects.len());
-    let is_hidden = |part: &&usize| {
-        let [area, buried] = of_part[**part];
-        buried > 0.0 && buried >= WHOLLY * area
+    let share = |part: usize| {
+        let [area, buried] = of_part[part];
+        if area > 0.0 { buried / area } else { 0.0 }
+    };
+    let suspected: Vec<bool> = (0..parts.len()).map(|part| share(part) >= MENTIONED).collect();
+    let is_light = light::is_there(survey);
+    let lit = light::comes(survey, &suspected, false, monitor)?;
+    let is_hidden = |part: &usize| {
+        let dark = if is_light { lit[*part].front == 0.0 } else { share(*part) >= WHOLLY };
+        suspected[*part] && dark
     };
     for (&object, inside) in &of_object {
         let Some(at) = inside.at else { continue };
         let own = &members[object as usize];
-        let (all, some) = (own.len(), own.iter().filter(is_hidden).count());
-        let whole = inside.share() >= WHOLLY;
-        let what = if whole {
-            "it lies".to_string()
-        } else if some > 0 {
-            format!("{some} of its {all} connected parts lie")
+        let hidden: Vec<usize> = own.iter().copied().filter(is_hidden).collect();
+        let whole = hidden.len() == own.len();
+        let (what, area) = if whole {
+            ("it lies".to_string(), inside.area)
+        } else if !hidden.is_empty() {
+            let what = format!("{} of its {} connected parts lie", hidden.len(), own.len());
+            (what, hidden.iter().map(|&part| of_part[part][0]).sum())
         } else if inside.share() >= MENTIONED {
-            format!("{} of it lies", percent(inside.share()))
+            (format!("{} of it lies", percent(inside.share())), inside.buried)
         } else {
             continue;
         };
@@ -99,14 +111,12 @@ pub(super) fn find(survey: &Surveyed, turned: &[bool]) -> Vec<Finding> {
             _ => "itself".into(),
         };
         let severity = if whole { Severity::Warning } else { Severity::Note };
-        let text = format!(
-            "{what} inside of {within}, where no light comes: {} m^2",
-            two_figures(inside.buried)
-        );
+        let text =
+            format!("{what} inside of {within}, where no light comes: {} m^2", two_figures(area));
         let finding = Finding::new(severity, Kind::Buried, survey.object(object), text)
             .at(at)
-            .remedy("leave it away; or, if it should be seen, open or flip what is around it");
-        findings.push((inside.buried, finding));
+            .remedy("remove it; or, if it should be seen, open or flip what is around it");
+        findings.push((area, finding));
     }
-    largest_first(findings)
+    Ok(largest_first(findings))
 }

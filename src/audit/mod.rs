@@ -11,6 +11,7 @@
 //! | `row_sums` | points that see more than the whole hemisphere: surfaces counted twice |
 //! | `reading` | what reading the file found, slivers, faces that nearly touch |
 //! | `parts`, `points`, `look` | connected parts of objects; where rays begin; what they meet |
+//! | `light` | whether light comes to a part |
 //! | `finding` | what a finding is, in words |
 //!
 //! A part is what is connected by common corners within one object. The share of rays, spread over
@@ -24,6 +25,7 @@ mod buried;
 mod closure;
 mod emitters;
 mod finding;
+mod light;
 mod look;
 mod parts;
 mod points;
@@ -144,7 +146,7 @@ pub fn audit(scene: &Scene, notices: &[Notice], monitor: &Monitor) -> Result<Aud
     findings.extend(reading::of_geometry(&survey));
     let (turned, own) = turned::find(&survey, monitor)?;
     findings.extend(own);
-    findings.extend(buried::find(&survey, &turned));
+    findings.extend(buried::find(&survey, &turned, monitor)?);
     findings.extend(emitters::find(&survey, &turned, &reflects));
     let (closure, own) = closure::find(&survey, &turned);
     findings.extend(own);

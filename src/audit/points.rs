@@ -85,12 +85,19 @@ pub(super) fn spread(scene: &Scene, parts: &Parts, exitance: &[f64]) -> Vec<Poin
     points
 }
 
-/// `count` points on the one-sided triangles of each part that is `wanted`, in the order of parts.
-pub(super) fn on_parts(scene: &Scene, parts: &Parts, wanted: &[bool], count: usize) -> Vec<Point> {
+/// `count` points on the sides of each part that is `wanted`, or on its one-sided triangles alone; in
+/// the order of parts.
+pub(super) fn on_parts(
+    scene: &Scene,
+    parts: &Parts,
+    wanted: &[bool],
+    one_sided: bool,
+    count: usize,
+) -> Vec<Point> {
     let sides = sides(scene, |i| {
         let two_sided = scene.materials[scene.triangles[i].material as usize].two_sided;
         let part = parts.of[i];
-        (wanted[part as usize] && !two_sided).then_some((part, false))
+        (wanted[part as usize] && !(one_sided && two_sided)).then_some((part, false))
     });
     let mut points = vec![];
     for group in sides.chunk_by(|a, b| a.stratum == b.stratum) {

@@ -6,7 +6,6 @@ use glam::DVec3;
 
 use super::Surveyed;
 use super::finding::{Finding, Kind, Severity, two_figures};
-use crate::geometry::{Bounds, file_rounding};
 use crate::mesh::Contacts;
 use crate::scene::{DISAGREES, Notice, group_notices};
 
@@ -78,19 +77,14 @@ fn aspect([a, b, c]: &[DVec3; 3]) -> f64 {
     square / e0.cross(e1).length()
 }
 
-/// Faces of different parts that face each other within the contact distance, but farther apart than
-/// roundings of a file: how many pairs of objects have them, and the widest.
+/// Faces of different parts that face each other within the contact distance, but do not touch: how
+/// many pairs of objects have them, and the widest.
 fn gaps(survey: &Surveyed) -> Option<Finding> {
     let parts = survey.parts;
-    let (low, high) = survey.scene.bounds();
-    let bounds = Bounds { min: low, max: high };
     // By pairs of objects: the largest gap and its place.
     let mut found: BTreeMap<(u32, u32), (f64, DVec3)> = BTreeMap::new();
     for (point, look) in survey.each() {
         let Some((triangle, height)) = look.gap else { continue };
-        if height <= file_rounding(bounds) {
-            continue;
-        }
         let other = parts.objects[parts.of[triangle as usize] as usize];
         let own = parts.objects[point.part as usize];
         let gap = found.entry((own.min(other), own.max(other))).or_insert((0.0, DVec3::ZERO));
@@ -109,7 +103,7 @@ fn gaps(survey: &Surveyed) -> Option<Finding> {
         two_figures(height)
     );
     let finding = Finding::new(Severity::Note, Kind::Gap, survey.object(a), text).at(at);
-    Some(finding.remedy("let them touch exactly, or leave a gap that can be seen"))
+    Some(finding.remedy("harmless, unless a gap that can be seen was meant"))
 }
 
 /// What could not be cut well where faces touch.

@@ -5,23 +5,17 @@
 //! ([`super::look::NEAR`]): something could see those backs. A closed block in a room has b = 0, and
 //! so has the room.
 //!
-//! **Turned** it is if light comes to its backs more than twice as often as to its fronts. Light is
-//! looked for along paths over sides that reflect, until one comes to what emits (or, where nothing
-//! does, out of the scene). Lamps that nothing sees do not count: a closed box around a lamp is not
-//! turned. So a sheet between two halves of a room is not turned, and a panel below
+//! **Turned** it is if light comes to its backs more than twice as often as to its fronts
+//! ([`super::light`]). A sheet between two halves of a room is not turned, and a panel below
 //! another one, with a cavity behind it, is not either: its back is seen by what nobody sees.
 //!
 //! What emits needs no other light: it is turned if b is more than ten times the same share of the
 //! rays from its fronts.
 
-use glam::DVec3;
-use rayon::prelude::*;
-
 use super::Surveyed;
-use super::emitters;
 use super::finding::{Finding, Kind, Severity, largest_first, percent};
+use super::light::{self, Sums};
 use super::look::Met;
-use super::points::on_parts;
 use crate::error::Result;
 use crate::monitor::Monitor;
 
@@ -35,42 +29,8 @@ const MORE: f64 = 2.0;
 /// The same for what emits: black backs of others before a lamp are no mistake of the lamp.
 const MUCH_MORE: f64 = 10.0;
 
-/// Points on each suspected part, and paths from each side of each of them at most.
-const POINTS: usize = 32;
-const MOST_PATHS: usize = 64;
-
-/// Paths of all together, roughly.
-const PATHS: usize = 1 << 18;
-
 /// Of the paths from a turned part's back at least so many come to light: fewer may be chance.
 const LEAST_LIT: f64 = 8.0;
-
-/// What fronts and backs of a part get: rays or paths, times what each stands for.
-#[derive(Clone, Copy, Default)]
-struct Sums {
-    all: f64,
-    front: f64,
-    back: f64,
-    /// Where the back gets most, and how much.
-    best: f64,
-    at: DVec3,
-}
-
-impl Sums {
-    fn add(&mut self, weight: f64, front: f64, back: f64, at: DVec3) {
-        self.all += weight;
-        self.front += weight * front;
-        self.back += weight * back;
-        if back > self.best {
-            (self.best, self.at) = (back, at);
-        }
-    }
-
-    /// Whether the back gets so many times as much as the front.
-    fn is_more(&self, times: f64) -> bool {
-        self.back > times * self.front
-    }
-}
 
 /// Which parts are turned, and what is to be said about them.
 pub(super) fn find(survey: &Surveyed, monitor: &Monitor) -> Result<(Vec<bool>, Vec<Finding>)> {
@@ -84,7 +44,7 @@ pub(super) fn find(survey: &Surveyed, monitor: &Monitor) -> Result<(Vec<bool>, V
     };
     let mut turned: Vec<bool> = sums.iter().zip(&emits).map(suspected).collect();
     let unsure: Vec<bool> = turned.iter().zip(&emits).map(|(&yes, &emits)| yes && !emits).collect();
-    let lit = lit(survey, &unsure, monitor)?;
+    let lit = light::comes(survey, &unsure, true, monitor)?;
     for part in (0..turned.len()).filter(|&part| unsure[part]) {
         turned[part] = lit[part].back >= LEAST_LIT && lit[part].is_more(MORE);
         sums[part] = lit[part];
@@ -110,33 +70,6 @@ fn seen(survey: &Surveyed) -> Vec<Sums> {
         sums[point.part as usize].add(point.area, share(&look.front), back, point.position);
     }
     sums
-}
-
-/// How many paths from fronts and backs of each part that is `wanted` come to light.
-fn lit(survey: &Surveyed, wanted: &[bool], monitor: &Monitor) -> Result<Vec<Sums>> {
-    let points = on_parts(survey.scene, survey.parts, wanted, POINTS);
-    let paths = (PATHS / (2 * points.len().max(1))).clamp(1, MOST_PATHS) as u32;
-    let bright = emitters::bright(survey);
-    let bright = bright.contains(&true).then_some(&bright[..]);
-    let stage = monitor.stage("audit", points.len() as u64);
-    let counts: Vec<[usize; 2]> = points
-        .par_iter()
-        .map_init(Vec::new, |stack, point| {
-            stage.advance(1)?;
-            let mut lit = |behind| {
-                let comes =
-                    |k: &u32| survey.looker.comes_to_light(point, behind, *k, bright, stack);
-                (0..paths).filter(comes).count()
-            };
-            Ok([lit(false), lit(true)])
-        })
-        .collect::<Result<_>>()?;
-    let mut sums = vec![Sums::default(); wanted.len()];
-    for (point, own) in points.iter().zip(counts) {
-        let [front, back] = own.map(|count| count as f64 / f64::from(paths));
-        sums[point.part as usize].add(f64::from(paths), front, back, point.position);
-    }
-    Ok(sums)
 }
 
 /// A finding for each object that has parts which are turned.

@@ -19,6 +19,21 @@ const MOST_PAIRS: usize = 10_000_000;
 
 /// Warnings about the scene as a whole, in the words of the command line.
 pub fn advice(scene: &Scene, light_scale: f64) -> Vec<Notice> {
+    let mut notices = darkness(scene, light_scale);
+    let size = scene.extent();
+    if !USUAL_SIZES.contains(&size) {
+        notices.extend(of_scene(vec![format!(
+            "it is {} m large, as lengths are read as metres: if another unit was meant, scale the \
+             scene where it was made. Light is the same in any unit; --eye, --look-at, --max-edge, \
+             --texels-per-metre and points to probe are not",
+            figure(size)
+        )]));
+    }
+    notices
+}
+
+/// Warnings that the scene is dark.
+pub fn darkness(scene: &Scene, light_scale: f64) -> Vec<Notice> {
     let whole_face = [DVec3::X, DVec3::Y, DVec3::Z];
     let any = |quantity: fn(&Scene, usize, &[DVec3; 3]) -> DVec3| {
         (0..scene.triangles.len()).any(|i| quantity(scene, i, &whole_face) != DVec3::ZERO)
@@ -48,15 +63,6 @@ pub fn advice(scene: &Scene, light_scale: f64) -> Vec<Notice> {
              let both sides radiate with --two-sided"
                 .into(),
         );
-    }
-    let size = scene.extent();
-    if !USUAL_SIZES.contains(&size) {
-        texts.push(format!(
-            "it is {} m large, as lengths are read as metres: if another unit was meant, scale the \
-             scene where it was made. Light is the same in any unit; --eye, --look-at, --max-edge, \
-             --texels-per-metre and points to probe are not",
-            figure(size)
-        ));
     }
     of_scene(texts)
 }

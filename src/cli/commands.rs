@@ -11,7 +11,7 @@ use lumel::render::{self, RenderOptions};
 use lumel::scene::Notice;
 use lumel::{Error, Monitor, Result, audit, probe, reference};
 
-use super::advice::{advice, advice_of_light};
+use super::advice::{advice_of_light, darkness};
 use super::args::{Cli, Command};
 use super::audit_text::AuditBlock;
 use super::bake_settings::BakeSettings;
@@ -55,8 +55,8 @@ fn inspect(settings: &InspectSettings) -> Result<()> {
     let mut description =
         session.clock.time("describe", || inspect::describe(&scene, &view, forecast));
     if settings.audit {
-        // What is said about the scene as a whole the audit finds for itself.
-        let own = advice(&scene, settings.scene.options.light_scale);
+        // That there is no light the audit finds for itself.
+        let own = darkness(&scene, settings.scene.options.light_scale);
         let notices: Vec<Notice> =
             scene.notices.iter().filter(|n| !own.contains(n)).cloned().collect();
         let audit = session.clock.time("audit", || audit::audit(&scene, &notices, &monitor))?;
