@@ -7,10 +7,12 @@ mod random;
 #[path = "common/rooms.rs"]
 mod rooms;
 
+use std::path::Path;
+
 use glam::DVec3;
 use lumel::Monitor;
 use lumel::operator::Walker;
-use lumel::scene::{Scene, Triangle};
+use lumel::scene::{Override, ReadOptions, Scene, Triangle, read};
 use lumel::solve::many::is_many;
 use lumel::solve::{Light, Reflected, WithinOptions, light_within};
 use rooms::furnished;
@@ -89,6 +91,27 @@ fn a_closed_furnace_is_as_bright_as_it_must_be() {
     let square = off.iter().map(|x| x * x).sum::<f64>() / off.len() as f64;
     println!("{} points, off by {:.2e}", off.len(), square.sqrt());
     assert!(square.sqrt() < 2e-2);
+}
+
+#[test]
+fn what_stands_on_a_floor_does_not_darken_it() {
+    // Patches that are mostly under something have their middles there, where it is dark.
+    let every = |text| vec![Override::parse(text).unwrap()];
+    let options = ReadOptions {
+        emission: every("*=0.3183098861837907"),
+        reflectance: every("*=0.5"),
+        ..ReadOptions::default()
+    };
+    let hall = read(Path::new("scenes/arcade.gltf"), &options).unwrap();
+    let light = within(&hall, 3e-2);
+    assert!(is_by_rays(&light));
+    let seen = |h: &f64| *h > 1.0;
+    let found: Vec<f64> =
+        at_triangles(&light, &hall, 201).into_iter().map(|h| h.x).filter(seen).collect();
+    let mean = found.iter().sum::<f64>() / found.len() as f64;
+    let square = found.iter().map(|h| (h - 2.0).powi(2)).sum::<f64>() / found.len() as f64;
+    println!("{} points, mean {mean}, off by {:.2e}", found.len(), square.sqrt());
+    assert!(found.len() > 20 && (mean - 2.0).abs() < 4e-3 && square.sqrt() < 1e-2);
 }
 
 #[test]

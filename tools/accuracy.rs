@@ -30,7 +30,7 @@ use serde_json::{Value, json};
 /// other.
 const CASES: [(&str, &[f64], f64, &[&str]); 3] = [
     ("cornell", &[3e-2, 1e-2, 3e-3, 1e-3, 3e-4], 1e-4, &WAYS),
-    ("paper", &[1e-2, 1e-3, 1e-4, 1e-5], 2e-6, &WAYS),
+    ("paper", &[1e-2, 1e-3, 1e-4], 5e-6, &WAYS),
     ("room", &[3e-2, 1e-2, 3e-3, 1e-3], 2.5e-4, &["uniform"]),
 ];
 
