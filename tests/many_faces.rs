@@ -115,6 +115,45 @@ fn what_stands_on_a_floor_does_not_darken_it() {
 }
 
 #[test]
+fn what_is_dark_below_a_plate_stays_dark() {
+    // Large faces, the floor and the plate's lower side, half a millimetre apart: each patch near
+    // the plate's rim is bright and dark, and in the slot one patch is all that points see.
+    let mut room = furnished(3);
+    let up = |t: &Triangle| t.normal_and_area().0.y > 0.9;
+    let lowest = room.bounds().0.y;
+    let high = |t: &Triangle| t.vertices.iter().map(|v| v.y).fold(f64::NEG_INFINITY, f64::max);
+    let is_floor = |t: &Triangle| up(t) && high(t) < lowest + 1e-9;
+    let floor: Vec<Triangle> = room.triangles.iter().filter(|t| is_floor(t)).cloned().collect();
+    assert!(!floor.is_empty());
+    room.triangles.retain(|t| !is_floor(t));
+    let mut fine = cut(&room, 3);
+    let (low, high) = room.bounds();
+    let corner = |x: f64, z: f64| {
+        DVec3::new(low.x + x * (high.x - low.x), lowest + 5e-4, low.z + z * (high.z - low.z))
+    };
+    let [a, b, c, d] = [corner(0.3, 0.2), corner(0.3, 0.7), corner(0.8, 0.7), corner(0.8, 0.2)];
+    let plate = [[a, b, c], [a, c, d], [a, c, b], [a, d, c]]
+        .map(|vertices| Triangle { vertices, ..floor[0].clone() });
+    fine.triangles.extend(floor.iter().chain(&plate).cloned());
+    let light = within(&fine, 3e-2);
+    assert!(is_by_rays(&light));
+    let mean = light.apart().unwrap().estimate.mean.x;
+    let mut walker = Walker::default();
+    let mut random = random::Random::new(7);
+    let mut largest = 0.0f64;
+    for _ in 0..200 {
+        let (x, z) = (random.within(0.31, 0.79), random.within(0.21, 0.69));
+        // From 2 cm on inside, less than (h/d)^2 of the light outside arrives: 1e-3.
+        for (y, n) in [(lowest, DVec3::Y), (lowest + 5e-4, DVec3::NEG_Y)] {
+            let found = light.irradiance(&mut walker, corner(x, z).with_y(y), n).x / mean;
+            largest = largest.max(found.abs());
+        }
+    }
+    println!("{largest:e} of the mean");
+    assert!(largest < 1e-2);
+}
+
+#[test]
 fn the_same_bits_on_any_number_of_threads() {
     let room = cut(&furnished(1), 3);
     let bits = |threads| {

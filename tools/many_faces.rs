@@ -121,7 +121,8 @@ fn reference(light: &Light, asked: &[RootPoints]) -> Vec<DVec3> {
         let direct = source.emitters.gather(walker, stage, point, n, source.allowed_direct);
         let reflected = match (&source.reflected, &source.rays) {
             (Reflected::Rays(radiant), Some(rays)) => {
-                let sources = Sources { reflected: Some(radiant), emitted: None };
+                let sources =
+                    Sources { reflected: Some(radiant), emitted: None, lamps: &rays.lamps };
                 let counts = RayCounts { least: RAYS, most: RAYS };
                 let scene = (&rays.scene, &light.mesh);
                 sources.gather(walker, scene, (point, n), 0.0, counts).irradiance

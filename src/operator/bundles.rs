@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use super::hemisphere::{direction, flips, near_ones_together};
 use super::lamps::{Lamps, Samples};
-use super::patches::{Patches, SPOTS, Spot};
+use super::patches::{CELLS, Patches, Spot};
 use super::walk::Walker;
 use crate::error::{Error, Result};
 use crate::geometry::{COINCIDENCE, RayTree};
@@ -115,9 +115,10 @@ impl RayScene {
     }
 }
 
-/// Rows of an operator on patches: irradiance at each spot is a mean of the radiosities of patches.
+/// Rows of an operator on cells of patches: irradiance at each spot is a mean of the radiosities of
+/// cells.
 pub struct Rows {
-    /// Patch and weight, and where those of each row are.
+    /// Cell and weight, and where those of each row are.
     entries: Vec<(u32, f32)>,
     ranges: Vec<Range<usize>>,
     /// Whether a spot is under something: it does not count.
@@ -196,11 +197,11 @@ impl Rows {
 
     /// Patches all spots of which are buried.
     fn lost(&self, patches: &Patches) -> Vec<bool> {
-        let buried = |patch| patches.range(patch).all(|spot| self.buried[spot]);
+        let buried = |patch| patches.cells(patch).all(|cell| self.buried[cell]);
         (0..patches.len()).map(buried).collect()
     }
 
-    /// Moves the spots of `lost` patches to where rays of others meet them, and tells which spots
+    /// Moves the spots of patches that are `lost` to where rays of others meet them, and tells which spots
     /// were moved.
     fn put_where_seen(
         &self,
@@ -210,9 +211,14 @@ impl Rows {
         samples: Samples,
         lost: &[bool],
     ) -> Vec<usize> {
+        // The patch of each cell of those.
+        let mut owner = vec![None; patches.spots().len()];
+        for patch in (0..patches.len()).filter(|&p| lost[p]) {
+            owner[patches.cells(patch)].fill(Some(patch as u32));
+        }
         let meets = |row: &usize| {
             let own = &self.entries[self.ranges[*row].clone()];
-            own.iter().any(|&(patch, _)| lost[patch as usize])
+            own.iter().any(|&(cell, _)| owner[cell as usize].is_some())
         };
         let known: &Patches = patches;
         let met: Vec<Vec<(u32, Spot)>> = (0..self.ranges.len())
@@ -226,8 +232,7 @@ impl Rows {
                 let hits = scene.in_order(0, samples.rays).filter_map(|k| {
                     match scene.cast(walker, mesh, origin, direction(frame, k, flips)) {
                         Met::Face { face, x, .. } => {
-                            let patch = known.at(face, x) as u32;
-                            lost[patch as usize].then_some((patch, Spot { face, x }))
+                            owner[known.at(face, x)].map(|patch| (patch, Spot { face, x }))
                         }
                         _ => None,
                     }
@@ -238,27 +243,27 @@ impl Rows {
         let mut found: BTreeMap<u32, Vec<Spot>> = BTreeMap::new();
         for (patch, spot) in met.into_iter().flatten() {
             let own = found.entry(patch).or_default();
-            if own.len() < SPOTS {
+            if own.len() < CELLS {
                 own.push(spot);
             }
         }
         let mut moved = vec![];
         for (patch, spots) in found {
             patches.put_spots(patch as usize, &spots);
-            moved.extend(patches.range(patch as usize));
+            moved.extend(patches.cells(patch as usize));
         }
         moved
     }
 
-    /// Irradiance at each spot from radiosities `u` of patches, for C channels.
+    /// Irradiance at each spot from radiosities `u` of cells, for C channels.
     pub fn at_spots<const C: usize>(&self, u: &[[f64; C]]) -> Vec<[f64; C]> {
         self.ranges
             .par_iter()
             .with_min_len(64)
             .map(|range| {
                 let mut sum = [0.0; C];
-                for &(patch, weight) in &self.entries[range.clone()] {
-                    let u = &u[patch as usize];
+                for &(cell, weight) in &self.entries[range.clone()] {
+                    let u = &u[cell as usize];
                     (0..C).for_each(|c| sum[c] += f64::from(weight) * u[c]);
                 }
                 sum
@@ -266,17 +271,28 @@ impl Rows {
             .collect()
     }
 
-    /// Means over the spots of each patch that are not buried; zero where all are.
-    pub fn means<const C: usize>(&self, patches: &Patches, at: &[[f64; C]]) -> Vec<[f64; C]> {
-        let mean = |patch: usize| {
-            let (mut sum, mut count) = ([0.0; C], 0.0f64);
-            for spot in patches.range(patch).filter(|&spot| !self.buried[spot]) {
-                (0..C).for_each(|c| sum[c] += at[spot][c]);
-                count += 1.0;
+    /// What cells have whose spots have `at`: those that are buried the mean of others of their patch;
+    /// zero where all are.
+    pub fn of_cells<const C: usize>(
+        &self,
+        patches: &Patches,
+        mut at: Vec<[f64; C]>,
+    ) -> Vec<[f64; C]> {
+        for patch in 0..patches.len() {
+            let cells = patches.cells(patch);
+            if !self.buried[cells.clone()].contains(&true) {
+                continue;
             }
-            sum.map(|s| s / count.max(1.0))
-        };
-        (0..patches.len()).into_par_iter().with_min_len(64).map(mean).collect()
+            let (mut sum, mut area) = ([0.0; C], 0.0);
+            for cell in cells.clone().filter(|&cell| !self.buried[cell]) {
+                (0..C).for_each(|c| sum[c] += patches.area[cell] * at[cell][c]);
+                area += patches.area[cell];
+            }
+            for cell in cells.filter(|&cell| self.buried[cell]) {
+                at[cell] = sum.map(|s| if area > 0.0 { s / area } else { 0.0 });
+            }
+        }
+        at
     }
 
     /// Whether a spot is under something.
@@ -297,7 +313,7 @@ impl Rows {
         all
     }
 
-    /// Pairs of a spot and a patch that are stored.
+    /// Pairs of a spot and a cell that are stored.
     pub fn entries(&self) -> usize {
         self.entries.len()
     }

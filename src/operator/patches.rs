@@ -1,9 +1,11 @@
-//! Sources of many small faces: patches, each with one radiosity.
+//! Sources of many small faces: patches of up to four cells, each cell with one radiosity.
 //!
-//! A face that is larger than the patches are to be is cut by a grid in its plane; smaller ones are
-//! taken together with others of the same object and material that lie in the same cube and face
-//! about the same way. Receivers are anywhere and know nothing of patches: these are but what the
-//! surface radiates, as coarsely as the sum over a hemisphere allows.
+//! A face that is larger than the patches are to be is cut by a grid in its plane, the cells being the
+//! quarters of a square; smaller ones are taken together with others of the same object and material
+//! that lie in the same cube and face about the same way, a quarter of their area to a cell.
+//! Receivers are anywhere and know nothing of patches: these are but what the surface radiates, as
+//! coarsely as the sum over a hemisphere allows. Each cell has a spot where light is gathered for
+//! it; how spots of one patch differ tells whether it is to be split.
 
 use std::collections::HashMap;
 
@@ -16,8 +18,8 @@ use crate::geometry::polygon::{Linear, twice_area};
 use crate::mesh::{Face, Mesh};
 use crate::scene::{self, Scene};
 
-/// Points of a patch at which light is gathered, at most.
-pub const SPOTS: usize = 4;
+/// Cells of a patch, at most.
+pub const CELLS: usize = 4;
 
 /// Sizes of patches, before they are split.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +30,7 @@ pub struct PatchSizes {
     pub cube: f64,
 }
 
-/// A point of a patch where light is gathered.
+/// A point of a cell where light is gathered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spot {
     /// Its face.
@@ -45,15 +47,20 @@ pub struct Patches {
     /// What each square of each face holds: see [`Content`].
     squares: Vec<Content>,
     shapes: Vec<Shape>,
-    /// Spots of one patch after the other, and where those of each end.
-    spots: Vec<Spot>,
+    /// Where the cells of each patch end: they are numbered one patch after the other.
     ends: Vec<usize>,
-    /// Area of each patch, square metres.
+    /// The spot of each cell.
+    spots: Vec<Spot>,
+    /// Area of each cell, square metres.
     pub area: Vec<f64>,
     /// Mean exitance E of each, W/m^2.
     pub exitance: Vec<DVec3>,
     /// Mean reflectance of each.
     pub reflectance: Vec<DVec3>,
+    /// Least and largest radiosity that was found in each patch so far, W/m^2.
+    pub found: Vec<[DVec3; 2]>,
+    /// How often these were made from others: spots are elsewhere each time.
+    round: u32,
 }
 
 /// Squares over a face, row by row.
@@ -71,7 +78,7 @@ struct Grid {
 enum Content {
     /// No part of the face.
     Nothing,
-    Patch(u32),
+    Cell(u32),
     /// Four squares of half the side: the first of their numbers, which are row by row.
     Squares(u32),
 }
@@ -85,14 +92,21 @@ enum Shape {
     Cube { faces: Vec<u32>, low: DVec3, side: f64 },
 }
 
+/// Of what nothing is known.
+const UNKNOWN: [DVec3; 2] = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+
 /// Most squares of all faces.
 const MOST_SQUARES: f64 = 2e7;
 
 /// A part of a face.
 struct Part {
     face: u32,
+    /// The square that it fills, of a face that is cut; counted from its patch's first.
+    quarter: u32,
     area: f64,
     centre: DVec2,
+    /// A point of it: the centre in round 0.
+    spot: DVec2,
     exitance: DVec3,
     reflectance: DVec3,
 }
@@ -115,10 +129,14 @@ impl Patches {
         for (number, face) in mesh.faces.iter().enumerate() {
             let count = across(face, sizes.square);
             let across = (count.x as u32, count.y as u32);
-            let (low, side, first) = (bounds(face).0, sizes.square, patches.squares.len() as u32);
+            let (low, high) = bounds(face);
+            let (mut side, first) = (sizes.square, patches.squares.len() as u32);
+            if across == (1, 1) {
+                side = (high - low).max_element();
+            }
             patches.grids.push(Grid { first, across, low, side });
             patches.squares.resize((first + across.0 * across.1) as usize, Content::Nothing);
-            if across == (1, 1) {
+            if side <= sizes.cube {
                 let triangle = &scene.triangles[face.triangle as usize];
                 let key = key_of(mesh, number, triangle.object, triangle.material, sizes.cube);
                 let place = *joined.entry(key).or_insert_with(|| {
@@ -139,6 +157,7 @@ impl Patches {
             Shape::Cube { faces, low, side: sizes.cube }
         };
         cut.extend(cubes.into_iter().map(cube));
+        patches.found = vec![UNKNOWN; cut.len()];
         patches.add(scene, mesh, cut);
         Ok(patches)
     }
@@ -146,8 +165,12 @@ impl Patches {
     /// The same with some patches split in four squares (or eight cubes), of which none may be left
     /// smaller than `least` metres.
     pub fn split(&self, scene: &Scene, mesh: &Mesh, which: &[bool], least: f64) -> Patches {
-        let (grids, squares) = (self.grids.clone(), self.squares.clone());
-        let mut patches = Patches { grids, squares, ..Patches::default() };
+        let (grids, mut squares) = (self.grids.clone(), self.squares.clone());
+        for content in squares.iter_mut().filter(|c| matches!(c, Content::Cell(_))) {
+            *content = Content::Nothing;
+        }
+        let round = self.round + 1;
+        let mut patches = Patches { grids, squares, round, ..Patches::default() };
         let mut cut = vec![];
         for (number, shape) in self.shapes.iter().enumerate() {
             match shape {
@@ -157,12 +180,9 @@ impl Patches {
                     patches.cut_square(*face, *low, *side, *place, &mut cut);
                 }
                 Shape::Cube { faces, .. } if which[number] && faces.len() == 1 => {
-                    let (low, high) = bounds(&mesh.faces[faces[0] as usize]);
-                    let (side, place) =
-                        ((high - low).max_element(), self.grids[faces[0] as usize].first);
+                    let Grid { low, side, first, .. } = self.grids[faces[0] as usize];
                     if side > 2.0 * least {
-                        patches.grids[faces[0] as usize].side = side;
-                        patches.cut_square(faces[0], low, side, place, &mut cut);
+                        patches.cut_square(faces[0], low, side, first, &mut cut);
                     } else {
                         cut.push(shape.clone());
                     }
@@ -172,109 +192,141 @@ impl Patches {
                 }
                 _ => cut.push(shape.clone()),
             }
+            let whole = cut.len() == patches.found.len() + 1;
+            patches.found.resize(cut.len(), if whole { self.found[number] } else { UNKNOWN });
         }
         patches.add(scene, mesh, cut);
         patches
     }
 
     fn cut_square(&mut self, face: u32, low: DVec2, side: f64, place: u32, cut: &mut Vec<Shape>) {
-        let first = self.squares.len() as u32;
-        self.squares[place as usize] = Content::Squares(first);
-        self.squares.extend([Content::Nothing; 4]);
+        let first = self.quarters(place);
         for k in 0..4 {
             let low = low + 0.5 * side * DVec2::new(f64::from(k & 1), f64::from(k >> 1));
             cut.push(Shape::Square { face, low, side: 0.5 * side, place: first + k });
         }
     }
 
+    /// The first of the four quarters of a square.
+    fn quarters(&mut self, place: u32) -> u32 {
+        if let Content::Squares(first) = self.squares[place as usize] {
+            return first;
+        }
+        let first = self.squares.len() as u32;
+        self.squares[place as usize] = Content::Squares(first);
+        self.squares.extend([Content::Nothing; 4]);
+        first
+    }
+
     /// Adds patches of the given shapes, but for empty ones.
     fn add(&mut self, scene: &Scene, mesh: &Mesh, shapes: Vec<Shape>) {
+        let round = self.round;
         let parts: Vec<Vec<Part>> = shapes
             .par_iter()
             .map(|shape| match shape {
                 Shape::Square { face, low, side, .. } => {
-                    quarters(scene, &mesh.faces[*face as usize], *face, *low, *side)
+                    quarters(scene, &mesh.faces[*face as usize], *face, (*low, *side), round)
                 }
                 Shape::Cube { faces, .. } => {
                     let whole = |&f: &u32| {
                         let face = &mesh.faces[f as usize];
-                        part(scene, face, f, &face.corners)
+                        part(scene, face, f, &face.corners, round)
                     };
                     faces.iter().map(whole).collect()
                 }
             })
             .collect();
-        for (shape, parts) in shapes.into_iter().zip(parts) {
+        let found = std::mem::take(&mut self.found);
+        for ((shape, parts), found) in shapes.into_iter().zip(parts).zip(found) {
             if parts.is_empty() {
                 continue;
             }
-            let number = self.area.len() as u32;
-            match &shape {
-                Shape::Square { place, .. } => {
-                    self.squares[*place as usize] = Content::Patch(number);
+            self.found.push(found);
+            if let Shape::Square { place, .. } = &shape {
+                let first = self.quarters(*place);
+                for part in &parts {
+                    self.add_cell(std::slice::from_ref(part), &[first + part.quarter]);
                 }
-                Shape::Cube { faces, .. } => {
-                    for &face in faces {
-                        let place = self.grids[face as usize].first as usize;
-                        self.squares[place] = Content::Patch(number);
-                    }
+            } else {
+                for own in in_quarters(&parts) {
+                    let square = |part: &Part| self.grids[part.face as usize].first;
+                    let squares: Vec<u32> = own.iter().map(square).collect();
+                    self.add_cell(own, &squares);
                 }
             }
+            self.ends.push(self.spots.len());
             self.shapes.push(shape);
-            self.push(&parts);
         }
     }
 
-    fn push(&mut self, parts: &[Part]) {
+    /// Adds a cell of some parts, which fill `squares`. Its spot is in one of them.
+    fn add_cell(&mut self, parts: &[Part], squares: &[u32]) {
         let area: f64 = parts.iter().map(|p| p.area).sum();
         let mean = |of: &dyn Fn(&Part) -> DVec3| -> DVec3 {
             parts.iter().map(|p| p.area * of(p)).sum::<DVec3>() / area
         };
+        let cell = self.spots.len() as u32;
+        let (mut sum, wanted) = (0.0, area * scattered(parts[0].centre, self.round)[2]);
+        let chosen = parts.iter().position(|p| {
+            sum += p.area;
+            sum >= wanted
+        });
+        let Part { face, spot, .. } = parts[chosen.unwrap_or(0)];
+        self.spots.push(Spot { face, x: spot });
         self.exitance.push(mean(&|p| p.exitance));
         self.reflectance.push(mean(&|p| p.reflectance));
         self.area.push(area);
-        // Evenly by area; the first, where roundings leave none.
-        let (mut sum, mut met) = (0.0, 0);
-        for (k, part) in parts.iter().enumerate() {
-            sum += part.area;
-            let wanted = (sum / area * SPOTS as f64 + 0.5) as usize;
-            if wanted > met || (k + 1 == parts.len() && met == 0) {
-                self.spots.push(Spot { face: part.face, x: part.centre });
-                met = wanted;
-            }
+        for &square in squares {
+            self.squares[square as usize] = Content::Cell(cell);
         }
-        self.ends.push(self.spots.len());
     }
 
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.area.len()
+        self.ends.len()
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.area.is_empty()
+        self.ends.is_empty()
     }
 
-    /// All spots, those of one patch after the other.
+    /// The spots of all cells.
     pub fn spots(&self) -> &[Spot] {
         &self.spots
     }
 
-    /// The range of a patch's own spots: 1 to [`SPOTS`].
-    pub fn range(&self, patch: usize) -> std::ops::Range<usize> {
+    /// The cells of a patch: 1 to [`CELLS`].
+    pub fn cells(&self, patch: usize) -> std::ops::Range<usize> {
         let begin = if patch == 0 { 0 } else { self.ends[patch - 1] };
         begin..self.ends[patch]
     }
 
     /// Puts the spots of a patch at other points of it, one or more.
     pub fn put_spots(&mut self, patch: usize, at: &[Spot]) {
-        for (k, spot) in self.range(patch).enumerate() {
-            self.spots[spot] = at[k % at.len()];
+        for (k, cell) in self.cells(patch).enumerate() {
+            self.spots[cell] = at[k % at.len()];
         }
     }
 
-    /// The patch at a point of a face, given in its plane.
+    /// Takes note of what was found at spots, but for those that are `hidden`; W/m^2.
+    ///
+    /// Reflectances are those of the patch, so that only light tells patches apart.
+    pub fn learn(&mut self, irradiance: &[[f64; 3]], hidden: impl Fn(usize) -> bool) {
+        for patch in 0..self.len() {
+            let cells = self.cells(patch);
+            let area: f64 = self.area[cells.clone()].iter().sum();
+            let weighed = cells.clone().map(|cell| self.area[cell] * self.reflectance[cell]);
+            let rho = weighed.sum::<DVec3>() / area;
+            let [least, most] = &mut self.found[patch];
+            for cell in cells.filter(|&cell| !hidden(cell)) {
+                let own = rho * DVec3::from_array(irradiance[cell]);
+                (*least, *most) = (least.min(own), most.max(own));
+            }
+        }
+    }
+
+    /// The cell at a point of a face, given in its plane.
     pub fn at(&self, face: u32, x: DVec2) -> usize {
         let grid = &self.grids[face as usize];
         let (across, up) = grid.across;
@@ -285,7 +337,7 @@ impl Patches {
         let (mut side, mut square) = (1.0, grid.first + j * across + i);
         loop {
             match self.squares[square as usize] {
-                Content::Patch(patch) => return patch as usize,
+                Content::Cell(cell) => return cell as usize,
                 Content::Nothing => return self.nearest(grid, place),
                 Content::Squares(first) => {
                     side *= 0.5;
@@ -298,7 +350,7 @@ impl Patches {
         }
     }
 
-    /// The patch nearest to a place of a grid that a rounding took off the face.
+    /// The cell nearest to a place of a grid that a rounding took off the face.
     fn nearest(&self, grid: &Grid, place: DVec2) -> usize {
         let mut best = (f64::INFINITY, 0);
         let mut stack: Vec<(u32, DVec2, f64)> = (0..grid.across.0 * grid.across.1)
@@ -308,7 +360,7 @@ impl Patches {
         while let Some((square, low, side)) = stack.pop() {
             let distance = place.distance_squared(place.clamp(low, low + side));
             match self.squares[square as usize] {
-                Content::Patch(patch) if distance < best.0 => best = (distance, patch as usize),
+                Content::Cell(cell) if distance < best.0 => best = (distance, cell as usize),
                 Content::Squares(first) if distance < best.0 => {
                     let half = 0.5 * side;
                     stack.extend((0..4).map(|k| {
@@ -382,12 +434,14 @@ fn across(face: &Face, square: f64) -> DVec2 {
 }
 
 /// A convex part of a face, with what varies over it averaged.
-fn part(scene: &Scene, face: &Face, number: u32, polygon: &[DVec2]) -> Part {
+fn part(scene: &Scene, face: &Face, number: u32, polygon: &[DVec2], round: u32) -> Part {
     let triangle = face.triangle as usize;
     let mut own = Part {
         face: number,
+        quarter: 0,
         area: 0.0,
         centre: DVec2::ZERO,
+        spot: DVec2::ZERO,
         exitance: DVec3::ZERO,
         reflectance: DVec3::ZERO,
     };
@@ -401,13 +455,78 @@ fn part(scene: &Scene, face: &Face, number: u32, polygon: &[DVec2]) -> Part {
         own.reflectance += area * scene::reflectance(scene, triangle, &footprint);
     }
     own.centre /= own.area;
+    own.spot = if round == 0 {
+        own.centre
+    } else {
+        inside(polygon, own.area, scattered(own.centre, round))
+    };
     own.exitance /= own.area;
     own.reflectance /= own.area;
     own
 }
 
-/// The parts of a face in the four quarters of a square: each has a spot of its own.
-fn quarters(scene: &Scene, face: &Face, number: u32, low: DVec2, side: f64) -> Vec<Part> {
+/// Three numbers from 0 to 1 for what has its centre at x: halves in round 0, and evenly spread over
+/// rounds (Roberts 2018: multiples of powers of the plastic number's kin, g^4 = g + 1).
+fn scattered(x: DVec2, round: u32) -> [f64; 3] {
+    if round == 0 {
+        return [0.5; 3];
+    }
+    // Mixed as by splitmix64.
+    let mix = |z: u64| {
+        let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    };
+    let mut seed = mix(mix(x.x.to_bits()).wrapping_add(x.y.to_bits()));
+    const G: f64 = 1.220_744_084_605_759_5;
+    [G, G * G, G * G * G].map(|power| {
+        seed = mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15));
+        let own = (seed >> 11) as f64 / (1u64 << 53) as f64;
+        (own + f64::from(round) / power).fract()
+    })
+}
+
+/// The point of a convex polygon of this area that three numbers from 0 to 1 choose.
+fn inside(polygon: &[DVec2], area: f64, [s, t, which]: [f64; 3]) -> DVec2 {
+    let mut left = which * area;
+    let mut k = 1;
+    while k + 2 < polygon.len() {
+        left -= 0.5 * twice_area(&[polygon[0], polygon[k], polygon[k + 1]]);
+        if left < 0.0 {
+            break;
+        }
+        k += 1;
+    }
+    let root = s.sqrt();
+    polygon[0] + root * ((1.0 - t) * (polygon[k] - polygon[0]) + t * (polygon[k + 1] - polygon[0]))
+}
+
+/// Parts in runs of about a quarter of their area each, [`CELLS`] of them at most.
+fn in_quarters(parts: &[Part]) -> Vec<&[Part]> {
+    let area: f64 = parts.iter().map(|p| p.area).sum();
+    let mut sum = 0.0;
+    let quarter: Vec<usize> = parts
+        .iter()
+        .map(|p| {
+            sum += p.area;
+            // By the middle of each.
+            (((sum - 0.5 * p.area) / area * CELLS as f64) as usize).min(CELLS - 1)
+        })
+        .collect();
+    let begins = |k: &usize| *k == 0 || quarter[*k] != quarter[*k - 1];
+    let mut first: Vec<usize> = (0..parts.len()).filter(begins).collect();
+    first.push(parts.len());
+    first.windows(2).map(|run| &parts[run[0]..run[1]]).collect()
+}
+
+/// The parts of a face in the four quarters of a square.
+fn quarters(
+    scene: &Scene,
+    face: &Face,
+    number: u32,
+    (low, side): (DVec2, f64),
+    round: u32,
+) -> Vec<Part> {
     let (mut pieces, half) = (Pieces::default(), 0.5 * side);
     let mut parts = vec![];
     for quarter in 0..4 {
@@ -422,7 +541,8 @@ fn quarters(scene: &Scene, face: &Face, number: u32, low: DVec2, side: f64) -> V
             pieces.push_clipped(&polygon, &Linear { g, c, uncertainty: 0.0 })
         });
         if inside {
-            let own = part(scene, face, number, pieces.get(pieces.len() - 1));
+            let mut own = part(scene, face, number, pieces.get(pieces.len() - 1), round);
+            own.quarter = quarter;
             // Slivers of roundings have no centre.
             if own.area > 0.0 && own.centre.is_finite() {
                 parts.push(own);

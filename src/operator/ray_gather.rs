@@ -3,8 +3,15 @@
 //! Rays into the hemisphere find what patches reflect ([`super::bundles`]), and with points of what
 //! emits they find that ([`super::lamps`]). Eight parts of them, each as evenly spread as the whole, tell
 //! how far off they are.
+//!
+//! Cells of patches radiate unevenly: one that lies partly under a cupboard is bright and dark.
+//! Far off that does not matter, since rays meet many cells. Where so many rays of one bundle would
+//! meet the same cell that its unevenness counts for more than the noise of a path, they
+//! do not take its mean: each goes on from where it met the cell, with one ray and one point of what emits.
 
-use glam::DVec3;
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
 
 use super::bundles::{Met, RayScene};
 use super::hemisphere::{direction, flips};
@@ -16,10 +23,38 @@ use crate::mesh::Mesh;
 
 /// What patches radiate, ready for gathering.
 pub struct RayRadiant {
-    /// Radiosity of each patch, W/m^2.
+    /// Radiosity of each cell of the patches, W/m^2.
     pub radiosity: Vec<DVec3>,
     /// The patches.
     pub patches: Patches,
+    /// Area of each cell over pi, m^2, times the square of the share of its patch's largest
+    /// radiosity by which light was found to vary there.
+    pub unevenness: Vec<f64>,
+}
+
+impl RayRadiant {
+    /// Radiosities of cells, and what is known of how these vary.
+    pub fn new(radiosity: Vec<DVec3>, patches: Patches) -> RayRadiant {
+        let unevenness = (0..patches.len())
+            .flat_map(|patch| {
+                let [least, most] = patches.found[patch];
+                let all = most.max_element();
+                let varies = if all > 0.0 { (most - least).max_element() / all } else { 0.0 };
+                let area = &patches.area;
+                patches.cells(patch).map(move |cell| varies * varies * area[cell] / PI)
+            })
+            .collect();
+        RayRadiant { radiosity, patches, unevenness }
+    }
+
+    /// Whether the mean of a cell will do for a ray that met it at a distance (squared) at a cosine,
+    /// one of so many.
+    fn is_even(&self, cell: usize, square: f64, cosine: f64, rays: u32) -> bool {
+        // About so many rays meet the cell; it fills no more than the hemisphere.
+        let varies = self.unevenness[cell];
+        let met = (varies * cosine / square).min(varies * PI / self.patches.area[cell]);
+        met * f64::from(rays) <= EVEN
+    }
 }
 
 /// What is gathered.
@@ -29,6 +64,8 @@ pub struct Sources<'a> {
     pub reflected: Option<&'a RayRadiant>,
     /// Light that is emitted.
     pub emitted: Option<&'a Lamps>,
+    /// All that emits: it lights what reflects.
+    pub lamps: &'a Lamps,
 }
 
 /// Rays that are cast before it is known whether they suffice, and at most.
@@ -69,6 +106,13 @@ const PARTS: usize = 8;
 const OF_PART: f64 = 4.756_828_460_010_884;
 const OF_HALF: f64 = 1.681_792_830_507_429;
 
+/// Rays go on where the square of what a cell's light varies by, relative, times the number of those
+/// that meet it is more than this.
+const EVEN: f64 = 1.0;
+
+/// Ways that a ray goes on, at most.
+const MOST_BOUNCES: u32 = 8;
+
 /// One ray and one point of what emits, over and over.
 const EACH: Samples = Samples { points: 1, rays: 1 };
 
@@ -102,7 +146,10 @@ impl Sources<'_> {
                     scene.cast(walker, mesh, point, towards)
                 {
                     if let Some(radiant) = self.reflected {
-                        sum.reflected += radiant.radiosity[radiant.patches.at(face, x)];
+                        let start = (face, x, square, cosine);
+                        let rays = counts.least;
+                        sum.reflected +=
+                            self.along(radiant, walker, (scene, mesh), start, (k, rays));
                     }
                     if let Some(lamps) = self.emitted {
                         sum.lit.seen += lamps.met(face, square, cosine * towards.dot(normal), EACH);
@@ -131,6 +178,42 @@ impl Sources<'_> {
                 before = own;
             }
         }
+    }
+}
+
+impl Sources<'_> {
+    /// The radiosity that ray `number` of a bundle of `rays` finds where it met a face (at a point, a
+    /// distance squared and a cosine): that of the cell, or, where that is too uneven, of the point.
+    fn along(
+        &self,
+        radiant: &RayRadiant,
+        walker: &mut Walker,
+        (scene, mesh): (&RayScene, &Mesh),
+        (mut face, mut x, mut square, mut cosine): (u32, DVec2, f64, f64),
+        (number, rays): (u32, u32),
+    ) -> DVec3 {
+        let (mut sum, mut weight) = (DVec3::ZERO, DVec3::ONE);
+        for bounce in 0.. {
+            let cell = radiant.patches.at(face, x);
+            if bounce == MOST_BOUNCES || radiant.is_even(cell, square, cosine, rays) {
+                sum += weight * radiant.radiosity[cell];
+                break;
+            }
+            weight *= radiant.patches.reflectance[cell];
+            let own = &mesh.faces[face as usize].frame;
+            let (point, normal) = (own.lift(x), own.n);
+            let lit = self.lamps.by_points(walker, scene, (point, normal), (number, 1), EACH);
+            sum += weight * lit.seen;
+            let towards = direction(own, number, flips(point));
+            let Met::Face { face: next, x: at, square: far, cosine: from } =
+                scene.cast(walker, mesh, point, towards)
+            else {
+                break;
+            };
+            sum += weight * self.lamps.met(next, far, from * towards.dot(normal), EACH);
+            (face, x, square, cosine) = (next, at, far, from);
+        }
+        sum
     }
 }
 

@@ -165,7 +165,7 @@ fn from_reflected(
             from_radiant(light, radiant, how, asked, monitor)
         }
         (Reflected::Rays(radiant), Some(rays)) => {
-            let sources = Sources { reflected: Some(radiant), emitted: None };
+            let sources = Sources { reflected: Some(radiant), emitted: None, lamps: &rays.lamps };
             from_rays(light, source, rays, &sources, asked, monitor)
         }
         (Reflected::Rays(_), None) => {
@@ -181,7 +181,11 @@ fn of_rays(light: &Light) -> Option<(&ApartSource, &RaySource, Sources<'_>)> {
     let (Reflected::Rays(radiant), Some(rays)) = (&source.reflected, &source.rays) else {
         return None;
     };
-    Some((source, rays, Sources { reflected: Some(radiant), emitted: Some(&rays.lamps) }))
+    Some((
+        source,
+        rays,
+        Sources { reflected: Some(radiant), emitted: Some(&rays.lamps), lamps: &rays.lamps },
+    ))
 }
 
 fn from_rays(

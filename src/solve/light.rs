@@ -262,7 +262,8 @@ impl ApartSource {
                 radiant.gather(walker, stage, point, normal, self.allowed)
             }
             (Reflected::Rays(radiant), Some(rays)) => {
-                let sources = Sources { reflected: Some(radiant), emitted: None };
+                let sources =
+                    Sources { reflected: Some(radiant), emitted: None, lamps: &rays.lamps };
                 let (scene, place) = ((&rays.scene, stage.mesh), (point, normal));
                 sources.gather(walker, scene, place, self.allowed, rays.counts).irradiance
             }

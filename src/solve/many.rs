@@ -3,8 +3,9 @@
 //! Emitted light is gathered exactly, or by rays where few of them tell enough. What is reflected
 //! is the radiosity of patches ([`crate::operator::patches`]), and irradiance from it a mean over
 //! bundles of rays ([`crate::operator::bundles`]): each face of such a scene fills little of any
-//! hemisphere. The error has two parts: that of the bundles, known from their halves, and that of the patches, known
-//! from what changes when they are made smaller.
+//! hemisphere. The error has two parts: that of the bundles, known from parts of them, and that of the
+//! patches, known from what changes when they are made smaller, and light is gathered at other
+//! points of them.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -106,7 +107,7 @@ pub fn light_of_many(
         share: 0.0,
         error: 0.0,
     };
-    let sources = Sources { reflected: None, emitted: Some(&rays.lamps) };
+    let sources = Sources { reflected: None, emitted: Some(&rays.lamps), lamps: &rays.lamps };
     let direct: Vec<DVec3> = at
         .par_iter()
         .map_init(Walker::default, |walker, s| {
@@ -248,7 +249,8 @@ impl Ladder<'_> {
         };
         let allowed = share::GATHER * tolerance * mean.max_element();
         let mesh = self.stage.mesh;
-        let sources = Sources { reflected: Some(&step.radiant), emitted: None };
+        let sources =
+            Sources { reflected: Some(&step.radiant), emitted: None, lamps: &self.rays.lamps };
         let found: Vec<Estimated> = self
             .samples
             .par_iter()
@@ -317,10 +319,10 @@ impl Ladder<'_> {
         let max_memory = self.options.max_memory;
         let (scene, lamps) = (&self.rays.scene, (&self.rays.lamps, samples));
         let rows = Rows::cast(scene, mesh, &mut patches, lamps, max_memory, self.monitor)?;
-        let mean_direct = rows.means(&patches, &rows.direct);
-        let begin: Vec<[f64; 3]> = times(&mean_direct, &patches.reflectance);
+        let direct = rows.of_cells(&patches, rows.direct.clone());
+        let begin: Vec<[f64; 3]> = times(&direct, &patches.reflectance);
         let apply = |u: &[[f64; 3]], out: &mut [[f64; 3]]| {
-            let own = rows.means(&patches, &rows.at_spots(u));
+            let own = rows.of_cells(&patches, rows.at_spots(u));
             let reflected = own.iter().zip(&patches.reflectance);
             out.par_iter_mut().zip(u).zip(reflected.collect::<Vec<_>>()).for_each(
                 |((out, u), (h, rho))| *out = std::array::from_fn(|c| u[c] - rho[c] * h[c]),
@@ -341,12 +343,13 @@ impl Ladder<'_> {
         for (h, d) in at_spots.iter_mut().zip(&rows.direct) {
             (0..3).for_each(|c| h[c] += d[c]);
         }
-        let irradiance = rows.means(&patches, &at_spots);
+        let irradiance = rows.of_cells(&patches, at_spots);
         let radiosity = times(&irradiance, &patches.reflectance);
-        let varies = self.varies(&patches, &rows, &at_spots, &radiosity);
+        patches.learn(&irradiance, |cell| rows.is_buried(cell));
+        let varies = self.varies(&patches);
         let vectors = |x: Vec<[f64; 3]>| x.into_iter().map(DVec3::from_array).collect();
         Ok(Step {
-            radiant: RayRadiant { radiosity: vectors(radiosity), patches },
+            radiant: RayRadiant::new(vectors(radiosity), patches),
             irradiance: vectors(irradiance),
             varies,
             entries: rows.entries(),
@@ -358,23 +361,13 @@ impl Ladder<'_> {
     }
 
     /// Which patches radiate so unevenly that they are to be split: those with nearly all of the
-    /// squared differences between spots.
-    fn varies(
-        &self,
-        patches: &Patches,
-        rows: &Rows,
-        at_spots: &[[f64; 3]],
-        radiosity: &[[f64; 3]],
-    ) -> Vec<bool> {
+    /// squared differences that were found within patches.
+    fn varies(&self, patches: &Patches) -> Vec<bool> {
         let squares: Vec<f64> = (0..patches.len())
             .map(|patch| {
-                let rho = patches.reflectance[patch];
-                let spots = patches.range(patch).filter(|&spot| !rows.is_buried(spot));
-                let off = spots.map(|spot| {
-                    let u = rho * DVec3::from_array(at_spots[spot]);
-                    (u - DVec3::from_array(radiosity[patch])).abs().max_element()
-                });
-                patches.area[patch] * off.fold(0.0, f64::max).powi(2)
+                let area: f64 = patches.area[patches.cells(patch)].iter().sum();
+                let [least, most] = patches.found[patch];
+                area * (0.5 * (most - least).max_element()).max(0.0).powi(2)
             })
             .collect();
         let total: f64 = squares.iter().sum();

@@ -11,8 +11,9 @@
 - Two-sided faces and such pairs that emit become two meshes back to back, each moved forward by
   APART of the scene's size.
 
-Other faces that lie in one plane, overlap and look in opposite directions are not told apart:
-rays may find the wrong one. (Those that look the same way lumel has already cut.)
+- One-sided faces that lie in one plane, overlap and look in opposite directions (a cupboard's top
+  and the ceiling that it touches) are moved APART likewise, so that rays find the one that looks
+  at them, as lumel's do. (Those that look the same way lumel has already cut.)
 
 Other modules here take `mi` and `dr` from this one, before they import anything else that imports
 drjit: it looks for its compiler when it is imported. Run by itself, this says whether Mitsuba works.
@@ -106,6 +107,50 @@ def opposite(exported):
     return other
 
 
+def in_one_plane(exported, single):
+    """How far to move each triangle along its normal so that it can be told from those that overlap
+    it, less than twice APART from its plane, and look the other way: forward, or back where it lies
+    behind the other; in units of APART. `single`: triangles that are one-sided and not paired."""
+    normal, corners, extent = exported.normal, exported.corners, exported.extent
+    moved = np.zeros(len(corners))
+    rounded = np.round(normal, 3) + 0.0
+    largest = rounded[np.arange(len(rounded)), np.abs(rounded).argmax(axis=1)]
+    turned = rounded * np.sign(largest)[:, None]
+    groups = {}
+    for k in np.nonzero(single)[0]:
+        groups.setdefault(tuple(turned[k]), []).append(k)
+    for key, members in groups.items():
+        members = np.array(members)
+        height = corners[members].mean(axis=1) @ np.array(key)
+        order = members[np.argsort(height)]
+        height = np.sort(height)
+        first = np.searchsorted(height, height - 2 * APART * extent)
+        end = np.searchsorted(height, height + 2 * APART * extent, side="right")
+        for k, begin, stop in zip(order, first, end):
+            others = order[begin:stop]
+            others = others[(normal[others] @ normal[k] < 0) & overlap(corners[k], corners[others], normal[k])]
+            if len(others):
+                behind = (corners[others].mean(axis=1) - corners[k].mean(axis=0)) @ normal[k]
+                moved[k] = -1 if behind[np.abs(behind).argmin()] > 1e-10 * extent else 1
+    return moved
+
+
+def overlap(triangle, others, normal):
+    """Whether triangles in one plane share area with `triangle`."""
+    apart = np.zeros(len(others), dtype=bool)
+    size = np.abs(triangle - triangle[0]).max()
+    for one, other in [(triangle[None], others), (others, triangle[None])]:
+        for i in range(3):
+            edge = one[:, (i + 1) % 3] - one[:, i]
+            across = np.cross(normal, edge)
+            across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
+            side = ((one[:, (i + 2) % 3] - one[:, i]) * across).sum(axis=1)
+            across *= np.where(side < 0, -1, 1)[:, None]
+            reach = ((other - one[:, i][:, None]) * across[:, None]).sum(axis=2).max(axis=1)
+            apart |= reach <= 1e-6 * size
+    return ~apart
+
+
 def mesh(corners, front, back, radiance):
     """A Mitsuba mesh of triangles with these reflectances; no back: black, and it blocks."""
     shape = mi.Mesh("part", 3 * len(corners), len(corners), props=properties(front, back, radiance))
@@ -134,6 +179,7 @@ def properties(front, back, radiance):
 def mitsuba_scene(exported):
     """The scene for Mitsuba, without sensor; emitters are sampled by their power."""
     twin = opposite(exported)
+    moved = in_one_plane(exported, (twin < 0) & ~exported.two_sided)
     groups = {}
 
     def add(k, front, back, radiance, corners):
@@ -149,7 +195,7 @@ def mitsuba_scene(exported):
         emits = radiance.max() > 0 or (other >= 0 and exported.radiance[other].max() > 0)
         forward = APART * exported.extent * exported.normal[k]
         if not paired:
-            add(k, front, None, radiance, corners)
+            add(k, front, None, radiance, corners + moved[k] * forward)
         elif emits:
             add(k, front, None, radiance, corners + forward)
             if other < 0:
