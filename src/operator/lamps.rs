@@ -22,7 +22,8 @@ use glam::{DVec2, DVec3};
 use super::bundles::RayScene;
 use super::hemisphere::{flips, in_square};
 use super::walk::Walker;
-use crate::geometry::{COINCIDENCE, Frame, Pieces, ray, triangle_area};
+use crate::geometry::polygon::Linear;
+use crate::geometry::{COINCIDENCE, Frame, Pieces, triangle_area};
 use crate::kernel::{self, Precision, View};
 use crate::mesh::Mesh;
 use crate::scene::{self, Scene};
@@ -30,6 +31,8 @@ use crate::scene::{self, Scene};
 /// All that emits.
 pub struct Lamps {
     lamps: Vec<Lamp>,
+    /// Planes that they lie in, where they are few.
+    planes: Vec<Plane>,
     /// Of each face of the mesh its lamp.
     of_face: Vec<Option<u32>>,
     /// Power of all lamps up to and with each, as a share of the whole.
@@ -79,6 +82,13 @@ struct Lamp {
     exitance: DVec3,
 }
 
+/// A plane with lamps that radiate to one side of it.
+struct Plane {
+    frame: Frame,
+    /// Numbers of lamps with their sides in the plane: a point is inside where all are positive.
+    lamps: Vec<(u32, [Linear; 3])>,
+}
+
 impl Lamps {
     /// All faces of a mesh that emit; textures are averaged over each.
     pub fn new(scene: &Scene, mesh: &Mesh) -> Lamps {
@@ -100,7 +110,9 @@ impl Lamps {
             }
         }
         until.iter_mut().for_each(|u| *u /= sum);
-        Lamps { lamps, of_face, until, density: 1.0 / sum, even, magnitude: mesh.magnitude }
+        let magnitude = mesh.magnitude;
+        let planes = if lamps.len() <= FEW { planes(&lamps, magnitude) } else { vec![] };
+        Lamps { lamps, planes, of_face, until, density: 1.0 / sum, even, magnitude }
     }
 
     /// Whether each face emits evenly: otherwise what samples find is a mean over it.
@@ -134,15 +146,18 @@ impl Lamps {
     /// are few; as [`Lamps::met`].
     pub fn along(&self, point: DVec3, direction: DVec3, cosine: f64, samples: Samples) -> DVec3 {
         let mut sum = DVec3::ZERO;
-        for lamp in &self.lamps {
-            let from = -direction.dot(lamp.frame.n);
-            if from <= 0.0 || lamp.frame.height(point) <= COINCIDENCE * self.magnitude {
+        for plane in &self.planes {
+            let (from, height) = (-direction.dot(plane.frame.n), plane.frame.height(point));
+            if from <= 0.0 || height <= COINCIDENCE * self.magnitude {
                 continue;
             }
-            if let Some(hit) = ray::intersect(point, direction, &lamp.corners)
-                && hit.t > 0.0
-            {
-                sum += self.weighed(lamp, hit.t * hit.t, cosine * from, samples);
+            let t = height / from;
+            let x = plane.frame.project(point + t * direction);
+            for (lamp, sides) in &plane.lamps {
+                if sides.iter().all(|side| side.at(x) >= 0.0) {
+                    let lamp = &self.lamps[*lamp as usize];
+                    sum += self.weighed(lamp, t * t, cosine * from, samples);
+                }
             }
         }
         sum
@@ -209,6 +224,31 @@ impl Lamps {
         }
         sum
     }
+}
+
+/// The planes of lamps.
+fn planes(lamps: &[Lamp], magnitude: f64) -> Vec<Plane> {
+    let mut planes: Vec<Plane> = vec![];
+    for (number, lamp) in lamps.iter().enumerate() {
+        let holds = |plane: &Plane| {
+            let off = |p: &DVec3| plane.frame.height(*p).abs();
+            lamp.frame.n.dot(plane.frame.n) > 0.0
+                && lamp.corners.iter().all(|p| off(p) <= COINCIDENCE * magnitude)
+        };
+        let place = planes.iter().position(holds).unwrap_or_else(|| {
+            planes.push(Plane { frame: lamp.frame, lamps: vec![] });
+            planes.len() - 1
+        });
+        let own = &mut planes[place];
+        let flat = lamp.corners.map(|p| own.frame.project(p));
+        let sides = std::array::from_fn(|k| {
+            let (a, b) = (flat[k], flat[(k + 1) % 3]);
+            let g = (b - a).perp();
+            Linear { g, c: -g.dot(a), uncertainty: 0.0 }
+        });
+        own.lamps.push((number as u32, sides));
+    }
+    planes
 }
 
 /// The point of a triangle that belongs to a point of the unit square, evenly by area.
