@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::parts::Parts;
 use super::points::Point;
 use crate::error::Result;
-use crate::geometry::{Bounds, COINCIDENCE, Frame, RayHit, RayTree, contact_distance};
+use crate::geometry::{Bounds, COINCIDENCE, Frame, RayHit, RayTree};
 use crate::monitor::Monitor;
 use crate::operator::hemisphere::{direction, flips};
 use crate::scene::Scene;
@@ -75,9 +75,9 @@ impl<'a> Looker<'a> {
     pub(super) fn new(scene: &'a Scene, parts: &'a Parts, reflects: &'a [bool]) -> Looker<'a> {
         let triangles: Vec<[DVec3; 3]> = scene.triangles.iter().map(|t| t.vertices).collect();
         let bounds = triangles.iter().fold(Bounds::EMPTY, |b, t| b.union(Bounds::of(t)));
-        let magnitude = bounds.min.abs().max(bounds.max.abs()).max_element();
+        let magnitude = bounds.magnitude();
         let tree = RayTree::build(&triangles, |i, back| !back || is_two_sided(scene, i as u32));
-        let (lift, contact) = (COINCIDENCE * magnitude, contact_distance(bounds));
+        let (lift, contact) = (COINCIDENCE * magnitude, scene.contact_distance());
         Looker { scene, parts, reflects, tree, lift, contact }
     }
 

@@ -14,7 +14,6 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::geometry::contact_distance;
 use crate::monitor::Monitor;
 use crate::operator::Walker;
 use crate::reconstruct::Surface;
@@ -56,7 +55,7 @@ fn is_buried(
     let face = &mesh.faces[mesh.roots[root].face as usize];
     let [a, b, c] = mesh.roots[root].corners;
     let (point, n) = (face.frame.lift((a + b + c) / 3.0), face.frame.n);
-    let touching = contact_distance(mesh.bounds);
+    let touching = mesh.contact;
     let above = point + 2.0 * touching * n;
     let hides =
         |direction: DVec3| surface.cast(above, direction).is_some_and(|met| met.face.is_none());

@@ -11,7 +11,6 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::atlas::Atlas;
 use super::charts::CREASE;
-use crate::geometry::contact_distance;
 use crate::mesh::barycentric;
 use crate::reconstruct::Surface;
 use crate::reconstruct::fill::RootPoints;
@@ -42,7 +41,7 @@ pub(super) fn continued(
 ) -> Continued {
     let size = atlas.pages[page as usize];
     let texels = DVec2::new(f64::from(size.width), f64::from(size.height));
-    let touching = contact_distance(light.mesh.bounds);
+    let touching = light.mesh.contact;
     let mates = mates(scene);
     // Of each texel the nearest place that was found, and how far the edge is.
     let mut best: HashMap<u32, (f64, u32, DVec2)> = HashMap::new();

@@ -1,7 +1,6 @@
 //! What a scene lacks so that a user would be surprised by its light.
 
 use glam::DVec3;
-use lumel::geometry::{Bounds, contact_distance};
 use lumel::scene::{self, Notice, Scene};
 use lumel::solve::Light;
 
@@ -101,9 +100,8 @@ fn emitters_face_nothing(scene: &Scene) -> bool {
     if emitters.is_empty() || emitters.len() * scene.triangles.len() > MOST_PAIRS {
         return false;
     }
-    let (min, max) = scene.bounds();
     // A face that only touches the plane of another is not in front of it.
-    let touching = contact_distance(Bounds { min, max });
+    let touching = scene.contact_distance();
     let planes: Vec<(DVec3, bool)> = scene
         .triangles
         .iter()

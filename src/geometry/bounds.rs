@@ -50,6 +50,15 @@ impl Bounds {
         (self.max - self.min).max_element().max(0.0)
     }
 
+    /// Its largest coordinate in size; 0 when empty.
+    pub fn magnitude(self) -> f64 {
+        if self.min.cmple(self.max).all() {
+            self.min.abs().max(self.max.abs()).max_element()
+        } else {
+            0.0
+        }
+    }
+
     /// Largest value of `normal . x` over the box (its p-vertex).
     pub fn support(self, normal: DVec3) -> f64 {
         (normal * self.min).max(normal * self.max).element_sum()

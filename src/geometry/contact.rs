@@ -1,6 +1,6 @@
 //! How near is touching: one tolerance for everything in a scene that is meant to coincide.
 
-use super::Bounds;
+use super::{Bounds, COINCIDENCE};
 
 /// Share of the scene's longest side within which faces touch.
 ///
@@ -10,17 +10,18 @@ use super::Bounds;
 /// most this.
 pub const CONTACT: f64 = 1.0 / 1_048_576.0;
 
-/// The same for scenes far from the origin, relative to the largest coordinate: two units in the
-/// last place of f32. Lengths below it are roundings of a file.
-const FAR: f64 = 1.0 / 8_388_608.0;
+/// Two units in the last place of an f32, relative to it: what is between things of a file that are
+/// meant to coincide.
+pub const SINGLE: f64 = 1.0 / 8_388_608.0;
 
-/// Distance within which faces in `bounds` touch, in its unit; see [`CONTACT`].
-pub fn contact_distance(bounds: Bounds) -> f64 {
-    (CONTACT * bounds.extent()).max(file_rounding(bounds))
+/// Distance within which faces in `bounds` touch, in its unit; see [`CONTACT`]. Far from the origin
+/// it is what coordinates are known to: `rounding`, or that of f64.
+pub fn contact_distance(bounds: Bounds, rounding: f64) -> f64 {
+    (CONTACT * bounds.extent()).max(known_to(bounds, rounding))
 }
 
-/// Largest distance, in the unit of `bounds`, that coordinates of f32 put between things that are
-/// meant to coincide. At most [`contact_distance`].
-pub fn file_rounding(bounds: Bounds) -> f64 {
-    FAR * bounds.min.abs().max(bounds.max.abs()).max_element().max(0.0)
+/// What coordinates in `bounds` are known to, in its unit: `rounding`, if that is not better than
+/// f64. At most [`contact_distance`].
+pub fn known_to(bounds: Bounds, rounding: f64) -> f64 {
+    rounding.max(COINCIDENCE * bounds.magnitude())
 }

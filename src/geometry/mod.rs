@@ -13,7 +13,7 @@ pub mod ray_tree;
 
 pub use bounds::Bounds;
 pub use box_tree::BoxTree;
-pub use contact::{CONTACT, contact_distance, file_rounding};
+pub use contact::{CONTACT, SINGLE, contact_distance, known_to};
 pub use frame::Frame;
 pub use polygon::{Linear, Pieces, triangle_area};
 pub use ray_tree::{RayHit, RayTree};

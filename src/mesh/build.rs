@@ -7,7 +7,7 @@ use super::refine::{DEEPEST, Refinement, child, edge_for_count, level_for};
 use super::seams::{self, Joins};
 use super::{Basis, Face, Mesh, Root, contacts};
 use crate::error::{Error, Result};
-use crate::geometry::{Bounds, Frame};
+use crate::geometry::{Bounds, Frame, contact_distance};
 use crate::scene::Scene;
 
 /// How the surface is cut and refined.
@@ -61,7 +61,6 @@ pub fn build(scene: &Scene, options: &MeshOptions) -> Result<Mesh> {
     choose_levels(&mut roots, options.refinement);
     let bounds =
         scene.triangles.iter().fold(Bounds::EMPTY, |b, t| b.union(Bounds::of(&t.vertices)));
-    let magnitude = bounds.min.abs().max(bounds.max.abs()).max_element();
     let (element_root, element_corners) = elements(&mut roots)?;
     Ok(Mesh {
         basis: options.basis,
@@ -72,7 +71,8 @@ pub fn build(scene: &Scene, options: &MeshOptions) -> Result<Mesh> {
         element_root,
         element_corners,
         bounds,
-        magnitude,
+        magnitude: bounds.magnitude(),
+        contact: contact_distance(bounds, scene.rounding),
     })
 }
 

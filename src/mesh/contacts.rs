@@ -76,7 +76,7 @@ pub(super) fn find(
     let boxes: Vec<Bounds> = scene.triangles.iter().map(|t| Bounds::of(&t.vertices)).collect();
     let tree = BoxTree::build(&boxes);
     let all = boxes.iter().fold(Bounds::EMPTY, |a, &b| a.union(b));
-    let (tolerance, extent) = (contact_distance(all), all.extent());
+    let (tolerance, extent) = (contact_distance(all, scene.rounding), all.extent());
     let finder = Finder { scene, faces, front, joins, boxes, tree, tolerance, extent };
     let found: Vec<(Option<Cut>, Contacts)> =
         (0..scene.triangles.len()).into_par_iter().map(|i| finder.cut(i)).collect();

@@ -135,6 +135,8 @@ pub struct Mesh {
     pub bounds: Bounds,
     /// Largest coordinate in size; what roundings are relative to. Metres.
     pub magnitude: f64,
+    /// Distance within which faces touch, metres.
+    pub contact: f64,
 }
 
 impl Mesh {

@@ -22,6 +22,7 @@ use super::limits::MAX_TRIANGLES;
 use super::notices::Notices;
 use super::{Object, Scene, Triangle, gltf_guard, gltf_index, uri};
 use crate::error::{Error, Result};
+use crate::geometry::SINGLE;
 
 /// A glTF document with its bytes.
 pub(crate) struct Source<'a> {
@@ -158,8 +159,11 @@ impl<'a> Meshes<'a> {
         scene.objects.push(Object { name });
 
         let mirrors = world.matrix3.determinant() < 0.0;
+        let (mut largest, m) = (0.0f64, world.matrix3);
         for (triangle, material) in triangles.iter() {
             let mut triangle = triangle.clone();
+            let sizes = triangle.vertices.map(|p| p.abs().max_element());
+            largest = sizes.into_iter().fold(largest, f64::max);
             triangle.vertices = triangle.vertices.map(|p| world.transform_point3(p));
             triangle.object = object;
             triangle.material = match material {
@@ -173,6 +177,9 @@ impl<'a> Meshes<'a> {
             }
             scene.triangles.push(triangle);
         }
+        // Positions of a mesh are f32; a transform spreads the rounding of each over all three.
+        let stretch = (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element();
+        scene.rounding = scene.rounding.max(SINGLE * stretch * largest);
         Ok(())
     }
 }

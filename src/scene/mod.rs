@@ -13,6 +13,8 @@
 //! | `overrides` | what the command line changes in materials |
 //! | `hygiene` | degenerate and duplicate triangles |
 //! | `winding`, `corners` | neighbours that disagree about their front; which triangles share corners |
+//! | `canonical` | the order of objects, which follows from where they are |
+//! | `precision` | to how many digits coordinates are known |
 //! | `overlaps` | faces that overlap in one plane |
 //! | `texture`, `appearance` | images, and averages of what varies over a surface |
 //! | `camera`, `default_view` | views |
@@ -20,6 +22,7 @@
 
 mod appearance;
 mod camera;
+mod canonical;
 mod corners;
 mod default_view;
 mod gltf_accessor;
@@ -40,6 +43,7 @@ mod obj_text;
 mod overlaps;
 mod overrides;
 mod polygon;
+mod precision;
 mod read;
 mod texture;
 mod uri;
@@ -48,6 +52,8 @@ mod winding;
 use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
+
+use crate::geometry::{Bounds, contact_distance};
 
 pub use appearance::{exitance, reflectance};
 pub use camera::{Camera, Projection, look_at};
@@ -74,8 +80,11 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Decoded images.
     pub textures: Vec<Texture>,
-    /// Input faces, counter-clockwise seen from the side that radiates.
+    /// Input faces, counter-clockwise seen from the side that radiates; those of one object together,
+    /// in the order of the file, and objects in an order that does not depend on the file's.
     pub triangles: Vec<Triangle>,
+    /// What coordinates are known to, metres, where f64 holds more digits than the file gave; else 0.
+    pub rounding: f64,
     /// Cameras in the order of the file.
     pub cameras: Vec<Camera>,
     /// What was odd in the input and what was made of it.
@@ -168,6 +177,12 @@ impl Scene {
     pub fn extent(&self) -> f64 {
         let (low, high) = self.bounds();
         (high - low).max_element()
+    }
+
+    /// Distance within which faces touch, metres; see [`contact_distance`].
+    pub fn contact_distance(&self) -> f64 {
+        let (min, max) = self.bounds();
+        contact_distance(Bounds { min, max }, self.rounding)
     }
 
     /// Whether a material emits light in any channel, somewhere on its texture. An index past the

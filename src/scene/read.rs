@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::overrides::{self, Override};
-use super::{Scene, gltf_file, hygiene, obj_file, overlaps, uri, winding};
+use super::{Scene, canonical, gltf_file, hygiene, obj_file, overlaps, precision, uri, winding};
 use crate::error::{Error, Result};
 
 /// What the user wants changed in a scene while it is read. The default changes nothing.
@@ -35,8 +35,9 @@ impl Default for ReadOptions {
 ///
 /// The bytes decide before the name does: what begins with `glTF` is read as GLB whatever it is
 /// called. Materials are then changed as `options` ask, degenerate and duplicate triangles are left
-/// out, neighbours that disagree about their front are counted, and faces that overlap in one plane
-/// are cut; see [`Scene::notices`].
+/// out, neighbours that disagree about their front are counted, triangles are put in an order that does
+/// not depend on that of the objects, and faces that overlap in one plane are cut; see
+/// [`Scene::notices`].
 ///
 /// # Errors
 ///
@@ -65,7 +66,10 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Scene> {
     scene.files.insert(0, path.to_path_buf());
     overrides::apply(&mut scene, options)?;
     hygiene::clean(&mut scene)?;
+    // The reader leaves what it knows of coordinates before they were put in their place.
+    scene.rounding = precision::rounding(&scene, scene.rounding);
     winding::check(&mut scene);
+    canonical::arrange(&mut scene);
     overlaps::resolve(&mut scene);
     Ok(scene)
 }

@@ -20,6 +20,8 @@ pub struct Sample {
     pub normal: DVec3,
     /// Share of the surface that it stands for.
     pub weight: f64,
+    /// Whether it is beside an edge of its root.
+    pub at_rim: bool,
 }
 
 /// Bands by the least barycentric weight of their points, and how many points each has.
@@ -34,7 +36,7 @@ const STEPS: DVec2 = DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_3
 pub fn samples(mesh: &Mesh) -> Vec<Sample> {
     let total = surface_area(mesh);
     let mut samples = vec![];
-    for (least, most, count) in BANDS {
+    for (band, (least, most, count)) in BANDS.into_iter().enumerate() {
         // Similar triangles: scales of their sides about the centroid.
         let (outer, inner) = (1.0 - 3.0 * least, 1.0 - 3.0 * most);
         let weight = (outer * outer - inner * inner) / count as f64;
@@ -53,7 +55,7 @@ pub fn samples(mesh: &Mesh) -> Vec<Sample> {
                 let side = along as usize % 3;
                 let on_side = t[side].lerp(t[(side + 1) % 3], along.fract());
                 let point = frame.lift(middle + scale * (on_side - middle));
-                samples.push(Sample { point, normal: frame.n, weight });
+                samples.push(Sample { point, normal: frame.n, weight, at_rim: band > 0 });
                 made += 1;
             }
             before = after;

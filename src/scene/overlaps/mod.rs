@@ -10,7 +10,7 @@
 //! floor faces the other way than the floor: neither is an overlap.
 //!
 //! **What stays.** Of two sides, the one that is higher along their normal by more than the
-//! roundings of a file ([`crate::geometry::file_rounding`]): what lies on the floor hides it. If
+//! roundings of a file ([`Scene::rounding`]): what lies on the floor hides it. If
 //! neither is, that of the smaller patch (triangles of one object joined by edges in one plane):
 //! rugs and decals lie on floors and walls. Else the later one in the file. Where this contradicts
 //! itself (a over b over c over a), larger patches go below.
@@ -42,7 +42,7 @@ use rayon::prelude::*;
 use super::hygiene::about;
 use super::notices::Notices;
 use super::{Scene, Triangle};
-use crate::geometry::{Bounds, contact_distance, file_rounding};
+use crate::geometry::{Bounds, contact_distance, known_to};
 use carve::{BACK, Cover, FRONT, Part, carve};
 use pairs::{Pair, Plate};
 
@@ -69,7 +69,7 @@ pub struct Overlaps {
 pub fn resolve(scene: &mut Scene) {
     let bounds =
         scene.triangles.iter().fold(Bounds::EMPTY, |b, t| b.union(Bounds::of(&t.vertices)));
-    let tolerance = contact_distance(bounds);
+    let tolerance = contact_distance(bounds, scene.rounding);
     let two_sided: Vec<bool> = scene.triangles.iter().map(|t| is_two_sided(scene, t)).collect();
     let plates: Vec<Option<Plate>> =
         scene.triangles.par_iter().map(|t| Plate::new(&t.vertices)).collect();
@@ -88,7 +88,7 @@ pub fn resolve(scene: &mut Scene) {
     if found.is_empty() {
         return;
     }
-    let rank = order::ranks(scene, &plates, &two_sided, &found, file_rounding(bounds));
+    let rank = order::ranks(scene, &plates, &two_sided, &found, known_to(bounds, scene.rounding));
     let covers = covers(&found, &two_sided, &rank, scene.triangles.len());
     let carved: Vec<Carved> = (0..scene.triangles.len())
         .into_par_iter()

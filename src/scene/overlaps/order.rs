@@ -37,6 +37,9 @@ pub(super) fn ranks(
         area[p as usize] += plate.as_ref().map_or(0.0, |t| t.area);
     }
     let node = |triangle: u32, side: u8| 2 * patch[triangle as usize] + u32::from(side == BACK);
+    // Patches are numbered by their first triangle. Objects are numbered in the order of the file,
+    // which may not be that of the triangles.
+    let in_file = |n: u32| (scene.triangles[n as usize / 2].object, n);
 
     // Heights of the second patch over the first, all pairs of triangles together.
     let mut heights: BTreeMap<(u32, u32), (f64, f64)> = BTreeMap::new();
@@ -65,8 +68,7 @@ pub(super) fn ranks(
         } else if high < -rounding {
             false
         } else if equal {
-            // Patches are numbered by their first triangle.
-            b > a
+            in_file(b) > in_file(a)
         } else {
             of_b < of_a
         };
