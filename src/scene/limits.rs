@@ -24,8 +24,9 @@ const MAX_TRIANGLES: usize = 1 << 24;
 /// placed many times, of which nothing is left out.
 const BYTES_PER_TRIANGLE: u64 = 1500;
 
-/// Bytes that a texel takes: twelve, and a third more for the pyramid.
-const BYTES_PER_TEXEL: u64 = 16;
+/// Bytes that a texel takes at most while it is decoded, from 16 bits a channel; then it is sixteen, a
+/// quarter of them for the pyramid.
+const BYTES_PER_TEXEL: u64 = 24;
 
 /// What a scene may take in any case, bytes: so little is not worth refusing.
 const ANYWAY: u64 = 64 << 20;
