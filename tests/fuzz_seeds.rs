@@ -26,7 +26,13 @@ fn files(kind: &str) -> Vec<std::path::PathBuf> {
     list
 }
 
+/// One after the other: memory is measured.
 #[test]
+fn seeds_are_read_and_solved() {
+    every_reader_stands_its_seeds();
+    seeds_of_scenes_are_scenes_that_can_be_solved();
+}
+
 fn every_reader_stands_its_seeds() {
     let room = tempfile::tempdir().unwrap();
     for (kind, reader) in readers::READERS {
@@ -40,7 +46,6 @@ fn every_reader_stands_its_seeds() {
 }
 
 /// Seeds that are all refused would begin nothing.
-#[test]
 fn seeds_of_scenes_are_scenes_that_can_be_solved() {
     let room = tempfile::tempdir().unwrap();
     fs::write(room.path().join("picture"), readers::PICTURE).unwrap();

@@ -8,6 +8,7 @@ use lumel::bake::second_sets;
 use lumel::cluster::Clusters;
 use lumel::operator::{FastOptions, Operator, OperatorKind, Stage};
 use lumel::output::csv::Point;
+use lumel::output::machine;
 use lumel::scene::{self, MAX_REFLECTANCE, Scene};
 use lumel::solve::within::COARSEST;
 use lumel::solve::{WithinOptions, light_within};
@@ -21,6 +22,10 @@ const SOLVED: usize = 48;
 
 /// Seconds for the audit, and again for the solution.
 const SECONDS: f64 = 2.0;
+
+/// Bytes that a solution may take, and what it may take beside that, as the README states.
+const ALLOWED: u64 = 64 << 20;
+const MEMORY_BESIDE: u64 = 64 << 20;
 
 /// Of so many files that can be read one is solved, and one is audited: it takes hundreds of times
 /// as long as to read one. Which ones follows from their bytes, so that what is found is found again.
@@ -116,8 +121,11 @@ fn solve(scene: &Scene, monitor: &Monitor) {
         Some(Point { position: t.vertices.iter().sum::<DVec3>() / 3.0, normal })
     };
     let points: Vec<Point> = scene.triangles.iter().take(3).filter_map(middle).collect();
-    let results = light_within(scene, &WithinOptions::new(0.3, 64 << 20), monitor)
+    let before = machine::peak_memory().unwrap_or(0);
+    let results = light_within(scene, &WithinOptions::new(0.3, ALLOWED), monitor)
         .and_then(|light| probe::probe(scene, &light, &points, monitor));
+    let grown = machine::peak_memory().unwrap_or(0).saturating_sub(before);
+    assert!(grown <= ALLOWED + MEMORY_BESIDE, "{grown} bytes of memory, {ALLOWED} are allowed");
     match results {
         Ok(results) => {
             for h in results.iter().filter_map(|r| r.irradiance) {

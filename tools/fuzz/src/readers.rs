@@ -6,6 +6,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use lumel::output::csv::{format_results, parse_points, read_points};
+use lumel::output::machine;
 use lumel::scene::{self, ReadOptions};
 
 use crate::after::{number_of, refused, use_scene};
@@ -13,6 +14,11 @@ use crate::after::{number_of, refused, use_scene};
 /// Most texels of a picture that is decoded: larger ones, up to the program's own limit, differ in
 /// nothing but time.
 const MOST_TEXELS: u64 = 1 << 20;
+
+/// Bytes of memory for any file, for each byte of it, and for each texel, as the README states it.
+const MEMORY_ANYWAY: u64 = 64 << 20;
+const MEMORY_PER_BYTE: u64 = 600;
+const MEMORY_PER_TEXEL: u64 = 24;
 
 /// Polygons, concave ones too, negative indices, texture coordinates, a lamp.
 pub const OBJ: &str = "\
@@ -48,8 +54,11 @@ map_Ke picture
 /// Two by one texels.
 pub const PICTURE: &[u8] = include_bytes!("../seeds/picture/two.png");
 
+/// Has the bytes read as one kind of file, in a folder.
+pub type Reader = fn(&Path, &[u8]);
+
 /// Every reader by the name of its target.
-pub const READERS: [(&str, fn(&Path, &[u8])); 7] = [
+pub const READERS: [(&str, Reader); 7] = [
     ("gltf", gltf),
     ("glb", glb),
     ("obj", obj),
@@ -127,9 +136,18 @@ fn scene(folder: &Path, name: &str, bytes: &[u8]) {
     read(folder, name, bytes);
 }
 
-/// Reads a scene; `bytes` are those that vary.
+/// Reads a scene; `bytes` are those that vary. Memory is what the README states, without what a
+/// triangle takes to be meshed.
 fn read(folder: &Path, name: &str, bytes: &[u8]) {
-    match scene::read(&folder.join(name), &ReadOptions::default()) {
+    let before = machine::peak_memory().unwrap_or(0);
+    let result = scene::read(&folder.join(name), &ReadOptions::default());
+    let grown = machine::peak_memory().unwrap_or(0).saturating_sub(before);
+    let texels = result.as_ref().map_or(0, |scene| {
+        scene.textures.iter().map(|t| u64::from(t.width) * u64::from(t.height)).sum()
+    });
+    let stated = MEMORY_ANYWAY + MEMORY_PER_BYTE * bytes.len() as u64 + MEMORY_PER_TEXEL * texels;
+    assert!(grown <= stated, "{grown} bytes of memory for {}", bytes.len());
+    match result {
         Ok(scene) => use_scene(&scene, number_of(bytes)),
         Err(error) => refused(&error, &folder.to_string_lossy()),
     }
