@@ -332,6 +332,7 @@ fn options_change_materials() {
         light_scale: 2.0,
         emission: vec![Override::parse("Gr*=1,2,3").unwrap()],
         reflectance: vec![Override::parse("*=0.25").unwrap()],
+        ..ReadOptions::default()
     };
     let scene = read(&path, &options).unwrap();
     assert!(scene.materials[0].two_sided);

@@ -9,7 +9,7 @@ use lumel::mesh::{Basis, MeshOptions, Refinement};
 use lumel::operator::{FastOptions, OperatorKind};
 use lumel::scene::Scene;
 use lumel::solve::light::light;
-use lumel::solve::{Light, LightOptions, SolveOptions};
+use lumel::solve::{Light, LightOptions, SolveOptions, WithinOptions, light_within};
 
 const TOLERANCE: f64 = 1e-6;
 
@@ -123,4 +123,27 @@ fn rooms_that_no_light_reaches_are_not_built() {
     }
     assert!(light.solution.radiosity[lit_nodes..].iter().all(|u| *u == DVec3::ZERO));
     agrees_with_exact(&both, &light);
+}
+
+/// Meshes are refined in search of light that was missed, but not where it is proved that there is none.
+#[test]
+fn where_no_light_arrives_one_mesh_is_enough() {
+    let solve = |quads: &[([DVec3; 4], u32)]| {
+        let materials = vec![material("grey", 0.5, 0.0), material("lamp", 0.2, 1.0)];
+        let options = WithinOptions::new(0.3, u64::MAX);
+        light_within(&scene(quads, materials), &options, &Monitor::silent()).unwrap()
+    };
+    // A box that shines outward.
+    let outward: Vec<_> =
+        box_quads(DVec3::ZERO, DVec3::ONE, true).into_iter().map(|q| (q, 1)).collect();
+    let dark = solve(&outward);
+    let estimate = dark.apart().unwrap().estimate;
+    assert_eq!((estimate.steps, estimate.rms, estimate.mean), (1, 0.0, DVec3::ZERO));
+    assert!(dark.apart().unwrap().shortfall.is_none());
+    // A speck that it shines on lies between all points of coarse meshes.
+    let (x, y) = (1e-3 * DVec3::X, 1e-3 * DVec3::Y);
+    let at = DVec3::new(0.31, 0.47, 1.4);
+    let lit = solve(&[outward, vec![([at, at + y, at + x + y, at + x], 0)]].concat());
+    let estimate = lit.apart().unwrap().estimate;
+    assert!(estimate.steps > 1 && estimate.mean.min_element() > 0.0, "{estimate:?}");
 }

@@ -87,7 +87,7 @@ impl BakeSettings {
             .map(|(pattern, texels_per_metre)| Density { pattern, texels_per_metre })
             .collect();
         Ok(BakeSettings {
-            scene: scene(args.scene),
+            scene: scene(args.scene, &solve),
             output: args.output,
             to: bake.to,
             target,

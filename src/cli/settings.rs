@@ -178,10 +178,11 @@ pub struct ProbeSettings {
 impl InspectSettings {
     /// Checks what was typed.
     pub fn new(args: InspectArgs) -> Result<Self> {
+        let solve = solve(&args.solve)?;
         Ok(InspectSettings {
-            scene: scene(args.scene),
+            scene: scene(args.scene, &solve),
             view: view(args.view)?,
-            solve: solve(&args.solve)?,
+            solve,
             run: run(args.run),
             json: args.json,
             audit: args.audit,
@@ -220,7 +221,7 @@ impl RenderSettings {
             }
         }
         Ok(RenderSettings {
-            scene: scene(args.scene),
+            scene: scene(args.scene, &solve),
             output: args.output,
             view: view(args.view)?,
             picture: PictureOptions { exposure_ev: exposure, png_bits },
@@ -260,11 +261,12 @@ impl RenderSettings {
 impl ProbeSettings {
     /// Checks what was typed.
     pub fn new(args: ProbeArgs) -> Result<Self> {
+        let solve = solve(&args.solve)?;
         Ok(ProbeSettings {
-            scene: scene(args.scene),
+            scene: scene(args.scene, &solve),
             points: args.points,
             output: args.output,
-            solve: solve(&args.solve)?,
+            solve,
             run: run(args.run),
         })
     }
@@ -428,8 +430,9 @@ impl RunSettings {
     }
 }
 
-pub(super) fn scene(args: SceneArgs) -> SceneSettings {
+pub(super) fn scene(args: SceneArgs, solve: &SolveSettings) -> SceneSettings {
     let options = ReadOptions {
+        max_memory: solve.max_memory.unwrap_or(u64::MAX),
         two_sided: args.two_sided,
         light_scale: args.light_scale,
         emission: args.emission,

@@ -29,6 +29,17 @@ pub fn lit(stage: Stage, emits: &[bool], reflects: &[bool]) -> Vec<bool> {
     sends
 }
 
+/// Whether light from the roots that `emits` says may arrive on any root; false is a proof.
+pub fn arrives(stage: Stage, emits: &[bool]) -> bool {
+    if emits.len() > MOST_ROOTS {
+        return emits.contains(&true);
+    }
+    let cells: Vec<Cell> = (0..emits.len() as u32).map(|r| Cell::root(stage, r)).collect();
+    (0..emits.len()).filter(|&source| emits[source]).any(|source| {
+        (0..emits.len()).any(|r| r != source && may_see(stage, &cells[r], &cells[source]))
+    })
+}
+
 /// Whether light from one root may reach the other; false is a proof.
 fn may_see(stage: Stage, receiver: &Cell, source: &Cell) -> bool {
     let Stage { mesh, occluders, .. } = stage;

@@ -9,7 +9,7 @@ use gltf::json;
 use json::accessor::{ComponentType, Type};
 use json::validation::Checked;
 
-use super::gltf_buffers::view_bytes;
+use super::gltf_buffers::{self, view_bytes};
 use super::gltf_file::Source;
 use crate::error::{Error, Result};
 
@@ -101,7 +101,7 @@ pub(crate) fn read(
             layout.decode(view_bytes(source, what, view)?, stride, count).map_err(wrong)?
         }
         None => {
-            let bytes: u64 = source.buffers.iter().map(|b| b.len() as u64).sum();
+            let bytes = gltf_buffers::bytes(source);
             if count > bytes {
                 return Err(wrong(format!(
                     "it has {count} elements without data, more than the file has bytes \

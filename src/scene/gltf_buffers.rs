@@ -1,6 +1,8 @@
 //! The bytes behind a glTF document: the GLB container, buffers, images.
 
 use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
 
 use base64::Engine;
 use base64::engine::DecodePaddingMode;
@@ -58,19 +60,28 @@ pub(crate) fn split<'a>(path: &std::path::Path, bytes: &'a [u8]) -> Result<Parts
 pub(crate) fn load<'a>(
     source: &Source,
     mut blob: Option<Cow<'a, [u8]>>,
-) -> Result<Vec<Cow<'a, [u8]>>> {
+) -> Result<Vec<Rc<Cow<'a, [u8]>>>> {
     let mut buffers = Vec::new();
+    // A file that is the buffer of thousands is there once.
+    let mut files: HashMap<&str, Rc<Cow<[u8]>>> = HashMap::new();
     for (i, buffer) in source.root.buffers.iter().enumerate() {
         let what = named("buffer", i, buffer.name.as_deref());
         let bytes = match &buffer.uri {
-            Some(uri) => Cow::Owned(resolve(source, &what, uri)?),
-            None if i == 0 => blob.take().ok_or_else(|| {
+            Some(uri) => match files.get(uri.as_str()) {
+                Some(bytes) => bytes.clone(),
+                None => {
+                    let bytes = Rc::new(Cow::Owned(resolve(source, &what, uri)?));
+                    files.insert(uri, Rc::clone(&bytes));
+                    bytes
+                }
+            },
+            None if i == 0 => Rc::new(blob.take().ok_or_else(|| {
                 Error::invalid(
                     source.path,
                     &what,
                     "it has neither a URI nor a binary chunk; export the scene again",
                 )
-            })?,
+            })?),
             None => {
                 return Err(Error::invalid(
                     source.path,
@@ -93,6 +104,12 @@ pub(crate) fn load<'a>(
         buffers.push(bytes);
     }
     Ok(buffers)
+}
+
+/// Bytes of all buffers, those of one file counted once.
+pub(crate) fn bytes(source: &Source) -> u64 {
+    let mut distinct = HashSet::new();
+    source.buffers.iter().filter(|b| distinct.insert(Rc::as_ptr(b))).map(|b| b.len() as u64).sum()
 }
 
 /// The encoded bytes of an image.

@@ -6,6 +6,7 @@
 
 use std::borrow::Cow;
 use std::path::Path;
+use std::rc::Rc;
 
 use gltf::json;
 use json::validation::Checked;
@@ -18,7 +19,7 @@ use super::gltf_exact::Exact;
 use super::gltf_material::Materials;
 use super::gltf_mesh::{self, MaterialId};
 use super::gltf_nodes::{self, Placed};
-use super::limits::MAX_TRIANGLES;
+use super::limits::Budget;
 use super::notices::Notices;
 use super::{Object, Scene, Triangle, gltf_guard, gltf_index, uri};
 use crate::error::{Error, Result};
@@ -32,8 +33,8 @@ pub(crate) struct Source<'a> {
     pub(crate) root: &'a json::Root,
     /// Numbers of the JSON in f64.
     pub(crate) exact: &'a Exact,
-    /// Bytes of every buffer.
-    pub(crate) buffers: Vec<Cow<'a, [u8]>>,
+    /// Bytes of every buffer; those of one file are there once.
+    pub(crate) buffers: Vec<Rc<Cow<'a, [u8]>>>,
 }
 
 impl Source<'_> {
@@ -62,12 +63,18 @@ impl Source<'_> {
 }
 
 /// Reads a glTF or GLB file.
-pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
+pub(crate) fn read(path: &Path, bytes: &[u8], budget: Budget) -> Result<Scene> {
     let parts = gltf_buffers::split(path, bytes)?;
     let bad_json = |e: serde_json::Error| {
         Error::unreadable(path, format!("its JSON is no glTF document: {e}; export it again"))
     };
-    let root = json::Root::from_slice(&parts.json).map_err(bad_json)?;
+    let root = json::Root::from_slice(&parts.json).map_err(|e| {
+        // Other versions have other structures: that is what to say of them, not where they differ.
+        match gltf_guard::other_version(&parts.json) {
+            Some(version) => gltf_guard::unsupported_version(path, &version),
+            None => bad_json(e),
+        }
+    })?;
     let exact: Exact = serde_json::from_slice(&parts.json).map_err(bad_json)?;
     if let Some((member, number)) = gltf_index::too_large(&parts.json).map_err(bad_json)? {
         return Err(Error::invalid(
@@ -82,9 +89,9 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
     source.buffers = gltf_buffers::load(&source, parts.blob)?;
 
     let placed = gltf_nodes::placed(&source, &mut notices)?;
-    let mut materials = Materials::read(&source, &mut notices)?;
+    let mut materials = Materials::read(&source, budget, &mut notices)?;
     let mut scene = Scene { path: path.to_path_buf(), ..Scene::default() };
-    let mut meshes = Meshes::new(&source);
+    let mut meshes = Meshes::new(&source, budget);
     for node in &placed {
         let read = &root.nodes[node.node];
         if let Some(mesh) = read.mesh {
@@ -116,12 +123,13 @@ struct Meshes<'a> {
     source: &'a Source<'a>,
     read: Vec<Option<Vec<(Triangle, MaterialId)>>>,
     default_material: Option<u32>,
+    budget: Budget,
 }
 
 impl<'a> Meshes<'a> {
-    fn new(source: &'a Source<'a>) -> Self {
+    fn new(source: &'a Source<'a>, budget: Budget) -> Self {
         let read = source.root.meshes.iter().map(|_| None).collect();
-        Meshes { source, read, default_material: None }
+        Meshes { source, read, default_material: None, budget }
     }
 
     /// Adds a node's mesh to the scene.
@@ -136,11 +144,10 @@ impl<'a> Meshes<'a> {
         let source = self.source;
         let triangles = match &mut self.read[mesh] {
             Some(triangles) => triangles,
-            empty => empty.insert(gltf_mesh::read(source, mesh, notices)?),
+            empty => empty.insert(gltf_mesh::read(source, mesh, self.budget, notices)?),
         };
-        if scene.triangles.len() + triangles.len() > MAX_TRIANGLES {
-            return Err(gltf_mesh::too_many(source, &source.node_name(placed.node)));
-        }
+        let count = scene.triangles.len() + triangles.len();
+        self.budget.triangles(source.path, &source.node_name(placed.node), count)?;
         let node = &source.root.nodes[placed.node];
         let mut world = placed.world;
         if node.skin.is_some() {

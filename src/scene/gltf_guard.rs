@@ -32,20 +32,39 @@ pub(crate) fn check(source: &Source, notices: &mut Notices) -> Result<()> {
 
 fn version(source: &Source) -> Result<()> {
     let asset = &source.root.asset;
-    let unsupported = |version: &str| {
-        Error::unsupported(
-            source.path,
-            "asset",
-            format!("glTF version \"{version}\"; export it as glTF 2.0"),
-        )
-    };
     if !asset.version.starts_with("2.") {
-        return Err(unsupported(&asset.version));
+        return Err(unsupported_version(source.path, &asset.version));
     }
     match &asset.min_version {
-        Some(least) if least != "2.0" => Err(unsupported(least)),
+        Some(least) if least != "2.0" => Err(unsupported_version(source.path, least)),
         _ => Ok(()),
     }
+}
+
+/// The error for a version that is not read.
+pub(crate) fn unsupported_version(path: &std::path::Path, version: &str) -> Error {
+    let reason = format!("glTF version \"{version}\"; export it as glTF 2.0");
+    Error::unsupported(path, "asset", reason)
+}
+
+/// The version of a document, if it says one that is not 2.
+pub(crate) fn other_version(json: &[u8]) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Document {
+        asset: Asset,
+    }
+    #[derive(serde::Deserialize)]
+    struct Asset {
+        /// A number in the oldest ones.
+        version: serde_json::Value,
+    }
+    let document: Document = serde_json::from_slice(json).ok()?;
+    let version = match document.asset.version {
+        serde_json::Value::String(text) => text,
+        serde_json::Value::Number(number) => number.to_string(),
+        _ => return None,
+    };
+    (!version.starts_with("2.")).then_some(version)
 }
 
 fn extensions(source: &Source, notices: &mut Notices) -> Result<()> {

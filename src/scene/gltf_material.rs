@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use super::gltf_buffers;
 use super::gltf_file::Source;
-use super::limits::{MAX_SCENE_TEXELS, clamp_reflectance};
+use super::limits::{Budget, Texels, clamp_reflectance};
 use super::notices::Notices;
 use super::texture::{self, DecodeError, Encoding, Texture, TextureUse, Wrap};
 use super::{Material, gltf_exact};
@@ -24,18 +24,22 @@ use crate::error::{Error, Result};
 const DEFAULT_NAME: &str = "default";
 
 /// Materials as they are read, and the images that they use, each decoded once.
-#[derive(Default)]
 pub(crate) struct Materials {
     pub(crate) list: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
     decoded: BTreeMap<(usize, Encoding), usize>,
-    texels: u64,
+    texels: Texels,
 }
 
 impl Materials {
     /// All materials of the file, in its order.
-    pub(crate) fn read(source: &Source, notices: &mut Notices) -> Result<Self> {
-        let mut materials = Materials::default();
+    pub(crate) fn read(source: &Source, budget: Budget, notices: &mut Notices) -> Result<Self> {
+        let mut materials = Materials {
+            list: Vec::new(),
+            textures: Vec::new(),
+            decoded: BTreeMap::new(),
+            texels: Texels::new(budget),
+        };
         for i in 0..source.root.materials.len() {
             let material = materials.material(source, i, notices)?;
             materials.list.push(material);
@@ -164,28 +168,12 @@ impl Materials {
         };
         let bytes = gltf_buffers::image(source, image)?;
         let (width, height) = texture::dimensions(&bytes).map_err(fail)?;
-        add_texels(&mut self.texels, width, height)?;
+        self.texels.add(source.path, &what, width, height)?;
         let texture = texture::decode(&bytes, &what, encoding).map_err(fail)?;
         self.textures.push(texture);
         self.decoded.insert((image, encoding), self.textures.len() - 1);
         Ok(self.textures.len() - 1)
     }
-}
-
-/// Adds an image to the texels of a scene, which are limited.
-pub(crate) fn add_texels(texels: &mut u64, width: u32, height: u32) -> Result<()> {
-    *texels += u64::from(width) * u64::from(height);
-    // Twelve bytes each, and a third more for the pyramids.
-    let bytes = |texels: u64| texels * 16;
-    if *texels <= MAX_SCENE_TEXELS {
-        return Ok(());
-    }
-    Err(Error::Memory {
-        what: "decoding the textures".into(),
-        needed: bytes(*texels),
-        allowed: bytes(MAX_SCENE_TEXELS),
-        remedy: "scale the textures down".into(),
-    })
 }
 
 /// The affine map of `KHR_texture_transform`: scale, then rotate, then move. Counter-clockwise is

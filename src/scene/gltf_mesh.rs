@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 use super::Triangle;
 use super::gltf_accessor::{self as accessor, Elements};
 use super::gltf_file::Source;
-use super::limits::MAX_TRIANGLES;
+use super::limits::Budget;
 use super::notices::Notices;
 use crate::error::{Error, Result};
 
@@ -20,6 +20,7 @@ pub(crate) type MaterialId = Option<usize>;
 pub(crate) fn read(
     source: &Source,
     mesh: usize,
+    budget: Budget,
     notices: &mut Notices,
 ) -> Result<Vec<(Triangle, MaterialId)>> {
     let mut triangles = Vec::new();
@@ -30,20 +31,9 @@ pub(crate) fn read(
             notices.add(&what, "morph targets are left out; the base shape is used");
         }
         read_primitive(source, &what, primitive, &mut triangles, notices)?;
-        if triangles.len() > MAX_TRIANGLES {
-            return Err(too_many(source, &what));
-        }
+        budget.triangles(source.path, &what, triangles.len())?;
     }
     Ok(triangles)
-}
-
-/// The error for scenes beyond [`MAX_TRIANGLES`].
-pub(crate) fn too_many(source: &Source, what: &str) -> Error {
-    Error::unsupported(
-        source.path,
-        what,
-        format!("more than {MAX_TRIANGLES} triangles in all; simplify the scene"),
-    )
 }
 
 fn read_primitive(

@@ -4,14 +4,13 @@
 //! and names no line in its errors. `Kd` (times `map_Kd`) is the reflectance, `Ke` (times
 //! `map_Ke`) the radiance; images are sRGB. Numbers are taken as linear.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::gltf_material::add_texels;
-use super::limits::clamp_reflectance;
+use super::limits::{Budget, Texels, clamp_reflectance};
 use super::notices::Notices;
 use super::obj_text::{keyword, statements, words};
 use super::texture::{self, DecodeError, Encoding, Texture, TextureUse, Wrap};
@@ -30,31 +29,43 @@ pub(crate) struct Library<'a> {
     /// Files read: libraries and images.
     pub(crate) files: Vec<PathBuf>,
     numbers: HashMap<String, usize>,
+    /// Libraries by the names that asked for them.
+    asked: HashSet<String>,
+    /// Images by the library and the name that asked for them, and by their files.
+    named: HashMap<(PathBuf, String), usize>,
     decoded: BTreeMap<PathBuf, usize>,
-    texels: u64,
+    texels: Texels,
 }
 
 impl<'a> Library<'a> {
     /// No materials, for an OBJ file at `path`.
-    pub(crate) fn new(path: &'a Path) -> Self {
+    pub(crate) fn new(path: &'a Path, budget: Budget) -> Self {
         Library {
             path,
             list: Vec::new(),
             textures: Vec::new(),
             files: Vec::new(),
             numbers: HashMap::new(),
+            asked: HashSet::new(),
+            named: HashMap::new(),
             decoded: BTreeMap::new(),
-            texels: 0,
+            texels: Texels::new(budget),
         }
     }
 
-    /// Reads the files of a `mtllib` statement: one name, which may contain spaces, or several. A
-    /// missing file is a notice.
+    /// Reads the files of a `mtllib` statement: one name, which may contain spaces, or several, each
+    /// once however often it is asked for. A missing file is a notice.
     pub(crate) fn load(&mut self, argument: &str, notices: &mut Notices) -> Result<()> {
+        if !self.asked.insert(argument.to_string()) {
+            return Ok(());
+        }
         if let Some((file, bytes)) = find(self.path, unquoted(argument)) {
             return self.read(&file, &bytes, notices);
         }
         for name in argument.split_ascii_whitespace().map(unquoted) {
+            if !self.asked.insert(name.to_string()) {
+                continue;
+            }
             match find(self.path, name) {
                 Some((file, bytes)) => self.read(&file, &bytes, notices)?,
                 None => notices.add(
@@ -168,22 +179,17 @@ impl<'a> Library<'a> {
         if map.name.is_empty() {
             return Err(missing("it has no file name"));
         }
-        let (found, bytes) =
-            find(file, map.name).ok_or_else(|| missing("the file is not there"))?;
-        let index = match self.decoded.get(&found) {
+        let key = (file.to_path_buf(), map.name.to_string());
+        let index = match self.named.get(&key) {
             Some(&index) => index,
             None => {
-                let fail = |error| match error {
-                    DecodeError::Invalid(reason) => Error::invalid(&found, about, reason),
-                    DecodeError::Unsupported(reason) => Error::unsupported(&found, about, reason),
+                let (found, bytes) =
+                    find(file, map.name).ok_or_else(|| missing("the file is not there"))?;
+                let index = match self.decoded.get(&found) {
+                    Some(&index) => index,
+                    None => self.decode(found, &bytes, about, map.name)?,
                 };
-                let (width, height) = texture::dimensions(&bytes).map_err(fail)?;
-                add_texels(&mut self.texels, width, height)?;
-                let texture = texture::decode(&bytes, map.name, Encoding::Srgb).map_err(fail)?;
-                self.textures.push(texture);
-                self.decoded.insert(found.clone(), self.textures.len() - 1);
-                self.files.push(found);
-                self.textures.len() - 1
+                *self.named.entry(key).or_insert(index)
             }
         };
         let [su, sv] = map.scale;
@@ -194,6 +200,23 @@ impl<'a> Library<'a> {
             wrap: [if map.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2],
             ..TextureUse::plain(index)
         })
+    }
+}
+
+impl Library<'_> {
+    /// Decodes an image that was not there before; its number.
+    fn decode(&mut self, file: PathBuf, bytes: &[u8], about: &str, name: &str) -> Result<usize> {
+        let fail = |error| match error {
+            DecodeError::Invalid(reason) => Error::invalid(&file, about, reason),
+            DecodeError::Unsupported(reason) => Error::unsupported(&file, about, reason),
+        };
+        let (width, height) = texture::dimensions(bytes).map_err(fail)?;
+        self.texels.add(&file, about, width, height)?;
+        let texture = texture::decode(bytes, name, Encoding::Srgb).map_err(fail)?;
+        self.textures.push(texture);
+        self.decoded.insert(file.clone(), self.textures.len() - 1);
+        self.files.push(file);
+        Ok(self.textures.len() - 1)
     }
 }
 

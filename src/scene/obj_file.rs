@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
-use super::limits::MAX_TRIANGLES;
+use super::limits::Budget;
 use super::mtl::Library;
 use super::notices::Notices;
 use super::polygon::Cutter;
@@ -16,11 +16,11 @@ use super::{Object, Scene, Triangle, obj_text};
 use crate::error::{Error, Result};
 
 /// Reads an OBJ file with its materials and textures.
-pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
+pub(crate) fn read(path: &Path, bytes: &[u8], budget: Budget) -> Result<Scene> {
     let mut notices = Notices::default();
     let stem = path.file_stem().map_or("scene".into(), |s| s.to_string_lossy());
     let plain = obj_text::plain(path, bytes, &stem, &mut notices)?;
-    let mut library = Library::new(path);
+    let mut library = Library::new(path, budget);
     for argument in &plain.libraries {
         library.load(argument, &mut notices)?;
     }
@@ -54,7 +54,7 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
             Some(&number) => number,
             None => library.number_of_none(&mut notices),
         };
-        add_model(&mut scene, &model.mesh, object, material, &mut cutter, &mut notices)?;
+        add_model(&mut scene, &model.mesh, (object, material), budget, &mut cutter, &mut notices)?;
     }
     scene.materials = library.list;
     scene.textures = library.textures;
@@ -68,8 +68,8 @@ pub(crate) fn read(path: &Path, bytes: &[u8]) -> Result<Scene> {
 fn add_model(
     scene: &mut Scene,
     mesh: &tobj::Mesh,
-    object: u32,
-    material: u32,
+    (object, material): (u32, u32),
+    budget: Budget,
     cutter: &mut Cutter,
     notices: &mut Notices,
 ) -> Result<()> {
@@ -96,13 +96,7 @@ fn add_model(
         if let Some(flaw) = flaw {
             notices.add(&about, flaw.text());
         }
-        if scene.triangles.len() + triangles.len() > MAX_TRIANGLES {
-            return Err(Error::unsupported(
-                &scene.path,
-                about,
-                format!("more than {MAX_TRIANGLES} triangles in all; simplify the scene"),
-            ));
-        }
+        budget.triangles(&scene.path, &about, scene.triangles.len() + triangles.len())?;
         for corners in triangles {
             scene.triangles.push(Triangle {
                 vertices: corners.map(|i| polygon[i]),

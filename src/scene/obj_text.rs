@@ -15,8 +15,8 @@ use std::path::Path;
 use super::notices::Notices;
 use crate::error::{Error, Result};
 
-/// Most corners of one polygon: triangulating takes up to the square of it.
-pub(crate) const MAX_CORNERS: usize = 1 << 14;
+/// Most corners of one polygon: triangulating takes up to the square of it, some seconds here.
+pub(crate) const MAX_CORNERS: usize = 1 << 12;
 
 /// A plain OBJ text and the names that its numbers stand for.
 #[derive(Debug, Default)]
@@ -37,14 +37,18 @@ pub(crate) fn statements(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, s
     let mut lines = bytes.split(|&b| b == b'\n').enumerate();
     std::iter::from_fn(move || {
         let (number, line) = lines.next()?;
-        let mut text = trimmed(line);
-        if !text.starts_with('#') {
-            while let Some(start) = text.strip_suffix('\\') {
-                let next = lines.next().map_or(Cow::Borrowed(""), |(_, line)| trimmed(line));
-                text = Cow::Owned(format!("{start} {next}"));
-            }
+        let text = trimmed(line);
+        if text.starts_with('#') || !text.ends_with('\\') {
+            return Some((number + 1, text));
         }
-        Some((number + 1, text))
+        // One string that grows: a file may continue one line to its end.
+        let mut whole = text.into_owned();
+        while whole.ends_with('\\') {
+            whole.pop();
+            whole.push(' ');
+            whole.push_str(&lines.next().map_or(Cow::Borrowed(""), |(_, line)| trimmed(line)));
+        }
+        Some((number + 1, Cow::Owned(whole)))
     })
     .filter(|(_, text)| !text.is_empty() && !text.starts_with('#'))
 }

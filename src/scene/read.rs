@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::limits::Budget;
 use super::overrides::{self, Override};
 use super::{Scene, canonical, gltf_file, hygiene, obj_file, overlaps, precision, uri, winding};
 use crate::error::{Error, Result};
@@ -18,6 +19,8 @@ pub struct ReadOptions {
     /// Reflectances that replace those of the file (with textures, metal and vertex colours);
     /// later ones win.
     pub reflectance: Vec<Override>,
+    /// Bytes that the scene may take until it is meshed (64 MiB it may take in any case).
+    pub max_memory: u64,
 }
 
 impl Default for ReadOptions {
@@ -27,6 +30,7 @@ impl Default for ReadOptions {
             light_scale: 1.0,
             emission: Vec::new(),
             reflectance: Vec::new(),
+            max_memory: u64::MAX,
         }
     }
 }
@@ -42,17 +46,18 @@ impl Default for ReadOptions {
 /// # Errors
 ///
 /// [`Error::Unreadable`], [`Error::Invalid`] or [`Error::Unsupported`] for a bad file,
-/// [`Error::Usage`] for options that do not fit it, [`Error::Memory`] for images that together
-/// are too large.
+/// [`Error::Usage`] for options that do not fit it, [`Error::Memory`] for triangles or images that
+/// together are too many.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Scene> {
     let bytes = uri::read_regular(path).map_err(|reason| Error::unreadable(path, reason))?;
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let budget = Budget::new(options.max_memory);
     let mut scene = if bytes.starts_with(b"glTF") {
-        gltf_file::read(path, &bytes)?
+        gltf_file::read(path, &bytes, budget)?
     } else {
         match extension.as_deref() {
-            Some("gltf" | "glb") => gltf_file::read(path, &bytes)?,
-            Some("obj") => obj_file::read(path, &bytes)?,
+            Some("gltf" | "glb") => gltf_file::read(path, &bytes, budget)?,
+            Some("obj") => obj_file::read(path, &bytes, budget)?,
             _ => {
                 return Err(Error::unsupported(
                     path,

@@ -19,13 +19,14 @@ use super::light::{ApartSource, FORECAST_FROM, Light, Reflected, Source};
 use super::many::{is_many, light_of_many};
 use super::samples::{Sample, samples};
 use crate::cluster::Clusters;
+use crate::cluster::fit::Fit;
 use crate::error::{Error, Result};
 use crate::geometry::triangle_area;
 use crate::mesh::{self, Basis, Mesh, MeshOptions, Refinement};
 use crate::monitor::Monitor;
 use crate::operator::gather::Radiant;
 use crate::operator::walk::{Stage, Walker};
-use crate::operator::{FastOptions, Operator, OperatorKind};
+use crate::operator::{FastOptions, Operator, OperatorKind, reach};
 use crate::scene::Scene;
 use crate::visibility::Occluders;
 
@@ -174,6 +175,8 @@ struct Ladder<'a> {
     emitters: &'a Radiant,
     /// Emitted power over area, W/m^2.
     emission: DVec3,
+    /// False where it is proved that no light arrives anywhere.
+    arrives: bool,
     samples: Vec<Sample>,
     /// Direct irradiance at the samples.
     direct: Vec<DVec3>,
@@ -199,6 +202,9 @@ pub fn light_within(scene: &Scene, options: &WithinOptions, monitor: &Monitor) -
     refuse_too_large(stage, options)?;
     let whole = emission(scene, stage, f64::INFINITY, options.max_memory, monitor)?;
     let mean = mean_emission(&base, &whole);
+    let sends = |fit: &Fit<3>| fit.iter().flatten().any(|&e| e > 0.0);
+    let emits: Vec<bool> = whole.field.fits.iter().take(base.roots.len()).map(sends).collect();
+    let arrives = reach::arrives(stage, &emits);
     let unit = options.tolerance * mean.max_element();
     let emitters = emission(scene, stage, share::DIRECT * unit, options.max_memory, monitor)?;
     let samples = samples(&base);
@@ -214,6 +220,7 @@ pub fn light_within(scene: &Scene, options: &WithinOptions, monitor: &Monitor) -
         base: &base,
         emitters: &emitters,
         emission: mean,
+        arrives,
         samples,
         direct,
         direct_off,
@@ -388,7 +395,7 @@ impl Ladder<'_> {
             changes => of_change(changes),
         };
         // A spot of light may lie between all nodes of the first meshes.
-        let dark_for_good = self.emission == DVec3::ZERO || step >= DARK_FOR_GOOD;
+        let dark_for_good = !self.arrives || step >= DARK_FOR_GOOD;
         let (error, most) = match mean == DVec3::ZERO {
             true if dark_for_good => (0.0, 0.0),
             true => (f64::INFINITY, f64::INFINITY),

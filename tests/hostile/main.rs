@@ -6,6 +6,10 @@
 //! reads that one alone. The long form is
 //! `cargo test --release --test hostile -- --ignored --nocapture`.
 
+// What must hold of scenes is what the fuzz targets check.
+#[allow(dead_code)]
+#[path = "../../tools/fuzz/src/after.rs"]
+mod after;
 mod change;
 #[allow(dead_code)]
 #[path = "../common/random.rs"]
@@ -21,7 +25,7 @@ use std::time::{Duration, Instant};
 
 use lumel::output::csv::parse_points;
 use lumel::output::machine;
-use lumel::scene::{self, MAX_REFLECTANCE, ReadOptions, Scene};
+use lumel::scene::{self, ReadOptions};
 use random::Random;
 use scene_support::{Gltf, grey, png};
 use serde_json::json;
@@ -159,31 +163,11 @@ fn write(folder: &Path, good: &Good, number: u64) -> PathBuf {
     folder.join(names.rfind(is_scene).unwrap())
 }
 
-/// What every scene that is read must be.
-fn check(scene: &Scene) {
-    assert!(!scene.triangles.is_empty());
-    for (i, t) in scene.triangles.iter().enumerate() {
-        assert!(t.vertices.iter().all(|p| p.is_finite()), "a corner is not finite");
-        assert!(t.uv.iter().flatten().all(|x| x.is_finite()), "texture coordinates are not finite");
-        let (normal, area) = t.normal_and_area();
-        assert!(area >= 0.0 && normal.is_finite(), "{area}");
-        assert!((t.material as usize) < scene.materials.len());
-        assert!((t.object as usize) < scene.objects.len());
-        let whole = [glam::DVec3::X, glam::DVec3::Y, glam::DVec3::Z];
-        let (rho, e) = (scene::reflectance(scene, i, &whole), scene::exitance(scene, i, &whole));
-        assert!(rho.min_element() >= 0.0 && rho.max_element() <= MAX_REFLECTANCE, "{rho}");
-        assert!(e.min_element() >= 0.0 && e.is_finite(), "{e}");
-    }
-    for camera in &scene.cameras {
-        assert!(camera.eye.is_finite() && (camera.forward.length() - 1.0).abs() < 1e-6);
-    }
-}
-
 /// Reads a variant; whether it was a scene.
 fn read(path: &Path) -> bool {
     match scene::read(path, &ReadOptions::default()) {
         Ok(scene) => {
-            check(&scene);
+            after::check(&scene);
             true
         }
         Err(error) => {
