@@ -214,5 +214,6 @@ fn the_papers_surface_agrees() {
 
 #[test]
 fn the_room_agrees() {
-    check("room", 3e-3);
+    // Tight, since single points are off by several times the root mean square over the surface.
+    check("room", 1e-3);
 }

@@ -6,6 +6,7 @@ use lumel::mesh;
 use lumel::operator::clustered::{self, Kept};
 use lumel::operator::{FastOptions, Operator, OperatorKind, Stage};
 use lumel::scene::Scene;
+use lumel::solve::many::{self, is_many};
 use lumel::solve::within::COARSEST;
 use lumel::visibility::Occluders;
 use serde::Serialize;
@@ -37,11 +38,23 @@ impl Forecast {
             None => (settings.light_options().mesh, settings.operator),
         };
         let mesh = mesh::build(scene, &options)?;
+        let fits = |bytes| settings.max_memory.is_none_or(|allowed| bytes <= allowed);
+        if let Some(tolerance) = settings.tolerance
+            && is_many(mesh.roots.len(), tolerance)
+        {
+            let operator_bytes = many::forecast(scene, &mesh, tolerance)?;
+            return Ok(Forecast {
+                elements: mesh.elements(),
+                nodes: mesh.nodes(),
+                operator_bytes,
+                max_memory: settings.max_memory,
+                fits: fits(operator_bytes),
+            });
+        }
         let triangles: Vec<_> = scene.triangles.iter().map(|t| t.vertices).collect();
         let occluders = Occluders::build(&triangles);
         let clusters = Clusters::build(&mesh);
         let stage = Stage { mesh: &mesh, clusters: &clusters, occluders: &occluders };
-        let fits = |bytes| settings.max_memory.is_none_or(|allowed| bytes <= allowed);
         let mut operator_bytes = Operator::forecast(stage, operator);
         if let OperatorKind::Clustered(options) = operator
             && !fits(operator_bytes)
