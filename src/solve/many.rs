@@ -82,9 +82,10 @@ pub fn forecast(scene: &Scene, base: &Mesh, tolerance: f64) -> Result<u64> {
 }
 
 /// How many cells the last patches have for each of the first, and what share of a spot's rays meet
-/// a cell of their own: measured in a kitchen and in arcades of 5,000 to 250,000 triangles.
-const MORE_CELLS: f64 = 2.0;
-const OF_RAYS: f64 = 0.45;
+/// a cell of their own: measured in a kitchen of 62,000 triangles at 1 %. Where the tolerance is not met
+/// it is several times as many.
+const MORE_CELLS: f64 = 3.2;
+const OF_RAYS: f64 = 0.57;
 
 /// Bytes of a row, and of each cell that it has.
 const ROW_BYTES: f64 = 16.0;
