@@ -12,14 +12,15 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::Frame;
 
+/// Mixes 64 bits as SplitMix64 does (Steele, Lea & Flood 2014).
+pub(super) fn mix(x: u64) -> u64 {
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
 /// Flips of bits that belong to a point in space: the same wherever it is asked for.
 pub fn flips(point: DVec3) -> [u32; 2] {
-    // Mixing of 64 bits as in SplitMix64 (Steele, Lea & Flood 2014).
-    let mix = |x: u64| {
-        let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
-    };
     let bits = point
         .to_array()
         .iter()

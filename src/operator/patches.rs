@@ -12,6 +12,7 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::hemisphere::mix;
 use crate::error::{Error, Result};
 use crate::geometry::Pieces;
 use crate::geometry::polygon::{Linear, twice_area};
@@ -471,12 +472,6 @@ fn scattered(x: DVec2, round: u32) -> [f64; 3] {
     if round == 0 {
         return [0.5; 3];
     }
-    // Mixed as by splitmix64.
-    let mix = |z: u64| {
-        let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    };
     let mut seed = mix(mix(x.x.to_bits()).wrapping_add(x.y.to_bits()));
     const G: f64 = 1.220_744_084_605_759_5;
     [G, G * G, G * G * G].map(|power| {
