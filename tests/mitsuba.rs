@@ -131,7 +131,7 @@ fn pairs_of_view(scene: &Scene, light: &Light, data: &Value) -> Vec<Pair> {
     let estimate = light.apart().unwrap().estimate;
     // Radiance is rho H / pi with rho below 1.
     let unit = estimate.mean / std::f64::consts::PI;
-    let overall = estimate.rms.hypot(counts.error(estimate.mean)) * unit;
+    let overall = estimate.rms.hypot(counts.error()) * unit;
     let traced = vectors(&view["radiance"]).into_iter().zip(vectors(&view["standard_error"]));
     assert_eq!(traced.len(), pixels.len());
     let ours = pixels.iter().zip(&map).enumerate();

@@ -14,6 +14,7 @@ use lumel::mesh::Mesh;
 use lumel::operator::Walker;
 use lumel::operator::bundles::RayScene;
 use lumel::operator::hemisphere::{direction, flips, in_square};
+use lumel::operator::lamps::Place;
 use lumel::operator::ray_gather::{RayCounts, Sources};
 use lumel::output::machine;
 use lumel::reconstruct::fill::RootPoints;
@@ -121,11 +122,10 @@ fn reference(light: &Light, asked: &[RootPoints]) -> Vec<DVec3> {
         let direct = source.emitters.gather(walker, stage, point, n, source.allowed_direct);
         let reflected = match (&source.reflected, &source.rays) {
             (Reflected::Rays(radiant), Some(rays)) => {
-                let sources =
-                    Sources { reflected: Some(radiant), emitted: None, lamps: &rays.lamps };
+                let sources = Sources::reflected(radiant, &rays.lamps);
                 let counts = RayCounts { least: RAYS, most: RAYS };
                 let scene = (&rays.scene, &light.mesh);
-                sources.gather(walker, scene, (point, n), 0.0, counts).irradiance
+                sources.gather(walker, scene, Place::new(point, n), 0.0, counts).irradiance
             }
             (reflected, _) => source.gather_reflected(reflected, walker, stage, point, n),
         };

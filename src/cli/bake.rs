@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use glam::DVec3;
 use lumel::bake::files::{self, FileOptions, Files};
 use lumel::bake::vertices::{VertexOptions, vertex_light};
 use lumel::bake::{Atlas, LightmapOptions, bake_lightmaps, make_atlas, wanted};
@@ -127,7 +128,7 @@ fn to_lightmaps(
     let (maps, counts) = session.clock.time("bake", || {
         bake_lightmaps(scene, light, atlas, &LightmapOptions::default(), monitor)
     })?;
-    session.gathered(light, &counts.irradiance);
+    session.gathered(light, &counts.irradiance, mean(light));
     session.report.count("texels", atlas.pages.iter().map(|p| (p.width * p.height) as usize).sum());
     session.report.count("texels covered", counts.covered as usize);
     session.report.count("texels refined", counts.refined as usize);
@@ -152,7 +153,7 @@ fn to_vertices(
     let options = VertexOptions { tolerance, most: settings.most_triangles };
     let surface =
         session.clock.time("bake", || vertex_light(scene, light, wanted, &options, monitor))?;
-    session.gathered(light, &surface.counts);
+    session.gathered(light, &surface.counts, mean(light));
     session.report.count("triangles", surface.triangles.len());
     session.report.count("passes of refinement", surface.passes);
     session.report.value("error between vertices", surface.error);
@@ -186,7 +187,12 @@ fn file_options(settings: &BakeSettings, error: Option<f64>) -> FileOptions {
 
 /// Error of filling in, relative to the mean irradiance.
 fn filled(light: &Light, counts: &IrradianceCounts) -> f64 {
-    light.apart().map_or(0.0, |source| counts.error(source.estimate.mean))
+    counts.error(mean(light))
+}
+
+/// The mean irradiance of the surface, where it is known.
+fn mean(light: &Light) -> DVec3 {
+    light.apart().map_or(DVec3::ZERO, |source| source.estimate.mean)
 }
 
 /// Estimated error of the irradiance, with that of filling in.

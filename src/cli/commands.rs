@@ -113,11 +113,11 @@ fn render(settings: &RenderSettings) -> Result<()> {
         })
     })?;
     let hurried = hurried.then_some("the picture is coarse, with an eighth of the pixels each way");
-    session.gathered(&light, &gathered);
+    session.gathered(&light, &gathered.counts, gathered.against);
     let mut metadata = settings.metadata();
     metadata.push(("view".into(), view.camera.name.clone()));
     if let Some(source) = light.apart() {
-        let error = source.estimate.rms.hypot(gathered.error(source.estimate.mean));
+        let error = source.estimate.rms.hypot(gathered.error());
         metadata.push(("estimated error".into(), format!("{error:.2e}")));
         metadata.extend(source.shortfall.iter().map(|why| ("shortfall".into(), why.clone())));
     }
@@ -144,7 +144,7 @@ fn render(settings: &RenderSettings) -> Result<()> {
     }
     progress.clear();
     session.finish()?;
-    let filled = light.apart().map_or(0.0, |source| gathered.error(source.estimate.mean));
+    let filled = light.apart().map_or(0.0, |_| gathered.error());
     outcome::met(&light, filled, hurried)
 }
 

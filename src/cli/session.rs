@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use lumel::output::atomic::{check_writable, same_file};
 use lumel::output::report::{Report, StageClock};
 use lumel::reconstruct::irradiance::IrradianceCounts;
@@ -162,17 +163,17 @@ impl Session {
         Ok(light)
     }
 
-    /// Notes how much was gathered for the output.
-    pub fn gathered(&mut self, light: &Light, counts: &IrradianceCounts) {
+    /// Notes how much was gathered for the output, with errors relative to the irradiance `mean`.
+    pub fn gathered(&mut self, light: &Light, counts: &IrradianceCounts, mean: DVec3) {
         let report = &mut self.report;
         report.count("points", counts.direct.points as usize);
         report.count("gathers of direct light", counts.direct.gathered as usize);
         report.count("gathers of indirect light", counts.indirect.gathered as usize);
         if let Some(source) = light.apart() {
-            let filled = counts.error(source.estimate.mean);
+            let filled = counts.error(mean);
             report.value("estimated error of filling in", filled);
             report.value("estimated error of the output rms", source.estimate.rms.hypot(filled));
-            let largest = counts.largest_error(source.estimate.mean);
+            let largest = counts.largest_error(mean);
             report
                 .value("estimated error of the output maximum", source.estimate.maximum + largest);
         }

@@ -20,8 +20,8 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::hemisphere::{direction, flips, near_ones_together};
-use super::lamps::{Lamps, Samples};
-use super::patches::{CELLS, Patches, Spot};
+use super::lamps::{Lamps, Place, Samples};
+use super::patches::{CELLS, Patches, SPOTS, Spot};
 use super::walk::Walker;
 use crate::error::{Error, Result};
 use crate::geometry::{COINCIDENCE, RayTree};
@@ -115,20 +115,20 @@ impl RayScene {
     }
 }
 
-/// Rows of an operator on cells of patches: irradiance at each spot is a mean of the radiosities of
-/// cells.
+/// Rows of an operator on cells of patches: irradiance of each is a mean of the radiosities of
+/// cells that rays from its spots meet.
 pub struct Rows {
     /// Cell and weight, and where those of each row are.
     entries: Vec<(u32, f32)>,
     ranges: Vec<Range<usize>>,
-    /// Whether a spot is under something: it does not count.
+    /// Whether all spots of a cell are under something: they do not count.
     buried: Vec<bool>,
-    /// Emitted light that arrives at each spot, W/m^2.
+    /// Emitted light that arrives at each cell, W/m^2.
     pub direct: Vec<[f64; 3]>,
 }
 
 impl Rows {
-    /// Casts rays from each spot, and looks at points of `lamps`. Spots of patches that have none in the
+    /// Casts rays from the spots of each cell, and looks at points of `lamps`. Spots of patches that have none in the
     /// open, but are seen, are moved to where they are seen.
     ///
     /// # Errors
@@ -142,16 +142,16 @@ impl Rows {
         max_memory: u64,
         monitor: &Monitor,
     ) -> Result<Rows> {
-        let spots = patches.spots().to_vec();
-        let stage = monitor.stage("rays", spots.len() as u64);
+        let count = patches.count_of_cells();
+        let stage = monitor.stage("rays", count as u64);
         let mut rows = Rows { entries: vec![], ranges: vec![], buried: vec![], direct: vec![] };
         // In blocks, so that memory is known before it is too much.
-        for block in spots.chunks(BLOCK) {
-            let found: Vec<Option<Row>> = block
-                .par_iter()
-                .map_init(Walker::default, |walker, spot| {
+        for begin in (0..count).step_by(BLOCK) {
+            let found: Vec<Option<Row>> = (begin..(begin + BLOCK).min(count))
+                .into_par_iter()
+                .map_init(Walker::default, |walker, cell| {
                     stage.advance(1)?;
-                    Ok(row(scene, mesh, patches, (lamps, samples), walker, spot))
+                    Ok(row(scene, mesh, patches, (lamps, samples), walker, cell))
                 })
                 .collect::<Result<_>>()?;
             for own in found {
@@ -162,7 +162,7 @@ impl Rows {
                 rows.entries.extend(own.entries);
                 rows.ranges.push(begin..rows.entries.len());
             }
-            let share = rows.ranges.len() as f64 / spots.len() as f64;
+            let share = rows.ranges.len() as f64 / count as f64;
             let needed = (rows.bytes() as f64 / share) as u64;
             if needed > max_memory {
                 return Err(Error::Memory {
@@ -178,18 +178,17 @@ impl Rows {
             let moved = rows.put_where_seen(scene, mesh, patches, samples, &lost);
             let again: Vec<(usize, Option<Row>)> = moved
                 .into_par_iter()
-                .map_init(Walker::default, |walker, spot| {
-                    let at = &patches.spots()[spot];
-                    (spot, row(scene, mesh, patches, (lamps, samples), walker, at))
+                .map_init(Walker::default, |walker, cell| {
+                    (cell, row(scene, mesh, patches, (lamps, samples), walker, cell))
                 })
                 .collect();
-            for (spot, own) in again {
+            for (cell, own) in again {
                 let Some(own) = own else { continue };
                 let begin = rows.entries.len();
                 rows.entries.extend(own.entries);
-                rows.ranges[spot] = begin..rows.entries.len();
-                rows.direct[spot] = own.direct.to_array();
-                rows.buried[spot] = false;
+                rows.ranges[cell] = begin..rows.entries.len();
+                rows.direct[cell] = own.direct.to_array();
+                rows.buried[cell] = false;
             }
         }
         Ok(rows)
@@ -201,7 +200,7 @@ impl Rows {
         (0..patches.len()).map(buried).collect()
     }
 
-    /// Moves the spots of patches that are `lost` to where rays of others meet them, and tells which spots
+    /// Moves the spots of patches that are `lost` to where rays of others meet them, and tells whose
     /// were moved.
     fn put_where_seen(
         &self,
@@ -212,7 +211,7 @@ impl Rows {
         lost: &[bool],
     ) -> Vec<usize> {
         // The patch of each cell of those.
-        let mut owner = vec![None; patches.spots().len()];
+        let mut owner = vec![None; patches.count_of_cells()];
         for patch in (0..patches.len()).filter(|&p| lost[p]) {
             owner[patches.cells(patch)].fill(Some(patch as u32));
         }
@@ -225,25 +224,21 @@ impl Rows {
             .into_par_iter()
             .filter(meets)
             .map_init(Walker::default, |walker, row| {
-                let spot = &known.spots()[row];
-                let frame = &mesh.faces[spot.face as usize].frame;
-                let origin = frame.lift(spot.x);
-                let flips = flips(origin);
-                let hits = scene.in_order(0, samples.rays).filter_map(|k| {
-                    match scene.cast(walker, mesh, origin, direction(frame, k, flips)) {
-                        Met::Face { face, x, .. } => {
-                            owner[known.at(face, x)].map(|patch| (patch, Spot { face, x }))
-                        }
-                        _ => None,
+                let mut hits = vec![];
+                cast_from(scene, mesh, known.spots(row), samples, walker, |_, _, met| {
+                    if let Met::Face { face, x, .. } = met
+                        && let Some(patch) = owner[known.at(face, x)]
+                    {
+                        hits.push((patch, Spot { face, x }));
                     }
                 });
-                hits.collect()
+                hits
             })
             .collect();
         let mut found: BTreeMap<u32, Vec<Spot>> = BTreeMap::new();
         for (patch, spot) in met.into_iter().flatten() {
             let own = found.entry(patch).or_default();
-            if own.len() < CELLS {
+            if own.len() < CELLS * SPOTS {
                 own.push(spot);
             }
         }
@@ -255,8 +250,8 @@ impl Rows {
         moved
     }
 
-    /// Irradiance at each spot from radiosities `u` of cells, for C channels.
-    pub fn at_spots<const C: usize>(&self, u: &[[f64; C]]) -> Vec<[f64; C]> {
+    /// Irradiance of each cell by its spots from radiosities `u` of cells, for C channels.
+    pub fn at_cells<const C: usize>(&self, u: &[[f64; C]]) -> Vec<[f64; C]> {
         self.ranges
             .par_iter()
             .with_min_len(64)
@@ -271,7 +266,7 @@ impl Rows {
             .collect()
     }
 
-    /// What cells have whose spots have `at`: those that are buried the mean of others of their patch;
+    /// What cells have where rows say `at`: those that are buried the mean of others of their patch;
     /// zero where all are.
     pub fn of_cells<const C: usize>(
         &self,
@@ -295,12 +290,12 @@ impl Rows {
         at
     }
 
-    /// Whether a spot is under something.
-    pub fn is_buried(&self, spot: usize) -> bool {
-        self.buried[spot]
+    /// Whether a cell is under something.
+    pub fn is_buried(&self, cell: usize) -> bool {
+        self.buried[cell]
     }
 
-    /// Smallest and largest share of the rays of a spot that meet something that radiates; of spots
+    /// Smallest and largest share of the rays of a cell that meet something that radiates; of cells
     /// that are not buried.
     pub fn sums(&self) -> (f64, f64) {
         let mut all = (1.0f64, 0.0f64);
@@ -324,46 +319,96 @@ impl Rows {
     }
 }
 
-/// Spots whose rays are cast before memory is looked at.
+/// Cells whose rays are cast before memory is looked at.
 const BLOCK: usize = 16_384;
 
-/// What one spot sees.
+/// Rays from a spot, at least.
+const FROM_EACH: u32 = 4;
+
+/// Casts rays from some spots, each about as evenly spread as all of them: `with` gets the number of
+/// the spot and the direction.
+fn cast_from(
+    scene: &RayScene,
+    mesh: &Mesh,
+    spots: &[Spot],
+    samples: Samples,
+    walker: &mut Walker,
+    mut with: impl FnMut(usize, DVec3, Met),
+) {
+    let count = (samples.rays / FROM_EACH).clamp(1, SPOTS as u32);
+    let each = samples.rays / count;
+    let mut own = None;
+    for number in 0..count {
+        let spot = &spots[number as usize];
+        let frame = &mesh.faces[spot.face as usize].frame;
+        let origin = frame.lift(spot.x);
+        let flips = *own.get_or_insert_with(|| flips(origin));
+        for k in scene.in_order(number * each, each) {
+            let towards = direction(frame, k, flips);
+            with(number as usize, towards, scene.cast(walker, mesh, origin, towards));
+        }
+    }
+}
+
+/// What one cell sees.
 #[derive(Default)]
 struct Row {
     entries: Vec<(u32, f32)>,
     direct: DVec3,
 }
 
-/// The row of a spot; none where it is buried.
+/// What one spot sees.
+#[derive(Clone, Default)]
+struct Seen {
+    cells: Vec<u32>,
+    rays: u32,
+    black: u32,
+    direct: DVec3,
+}
+
+/// The row of a cell; none where all its spots are buried.
 fn row(
     scene: &RayScene,
     mesh: &Mesh,
     patches: &Patches,
     (lamps, samples): (&Lamps, Samples),
     walker: &mut Walker,
-    spot: &Spot,
+    cell: usize,
 ) -> Option<Row> {
-    let frame = &mesh.faces[spot.face as usize].frame;
-    let origin = frame.lift(spot.x);
-    let flips = flips(origin);
-    let (mut all, mut black, mut direct) = (vec![], 0, DVec3::ZERO);
-    for k in scene.in_order(0, samples.rays) {
-        let towards = direction(frame, k, flips);
-        match scene.cast(walker, mesh, origin, towards) {
+    let spots = patches.spots(cell);
+    let mut seen = vec![];
+    cast_from(scene, mesh, spots, samples, walker, |number, towards, met| {
+        seen.resize(number + 1, Seen::default());
+        let own = &mut seen[number];
+        own.rays += 1;
+        match met {
             Met::Face { face, x, square, cosine } => {
-                all.push(patches.at(face, x) as u32);
-                direct += lamps.met(face, square, cosine * towards.dot(frame.n), samples);
+                own.cells.push(patches.at(face, x) as u32);
+                let n = mesh.faces[spots[number].face as usize].frame.n;
+                own.direct += lamps.met(face, square, cosine * towards.dot(n), samples);
             }
-            Met::Black => black += 1,
+            Met::Black => own.black += 1,
             Met::Nothing => {}
         }
+    });
+    let each = samples.points / seen.len() as u32;
+    let (mut all, mut direct, mut rays) = (vec![], DVec3::ZERO, 0);
+    for (number, own) in seen.into_iter().enumerate() {
+        if f64::from(own.black) > BURIED * f64::from(own.rays) {
+            continue;
+        }
+        let frame = &mesh.faces[spots[number].face as usize].frame;
+        let place = Place::new(frame.lift(spots[number].x), frame.n);
+        let which = (number as u32 * each, each);
+        direct += own.direct + lamps.by_points(walker, scene, place, which, samples).seen;
+        all.extend(own.cells);
+        rays += own.rays;
     }
-    if f64::from(black) > BURIED * f64::from(samples.rays) {
+    if rays == 0 {
         return None;
     }
-    direct += lamps.by_points(walker, scene, (origin, frame.n), (0, samples.points), samples).seen;
     all.sort_unstable();
-    let share = |count: usize| (count as f64 / f64::from(samples.rays)) as f32;
+    let share = |count: usize| (count as f64 / f64::from(rays)) as f32;
     let entries = all.chunk_by(|a, b| a == b).map(|same| (same[0], share(same.len()))).collect();
-    Some(Row { entries, direct })
+    Some(Row { entries, direct: direct * f64::from(samples.rays) / f64::from(rays) })
 }

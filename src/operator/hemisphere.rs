@@ -28,6 +28,13 @@ pub fn flips(point: DVec3) -> [u32; 2] {
     [bits as u32, (bits >> 32) as u32]
 }
 
+/// Flips that differ for each number, made from others.
+pub fn flips_for(flips: [u32; 2], number: u64) -> [u32; 2] {
+    let bits = mix(u64::from(flips[0]) | u64::from(flips[1]) << 32);
+    let bits = mix(bits ^ mix(number.wrapping_add(0x9e37_79b9_7f4a_7c15)));
+    [bits as u32, (bits >> 32) as u32]
+}
+
 /// Point `index` of the sequence in the unit square.
 pub fn in_square(index: u32, flips: [u32; 2]) -> DVec2 {
     let first = index.reverse_bits();

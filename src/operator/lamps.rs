@@ -73,6 +73,24 @@ pub struct Samples {
     pub rays: u32,
 }
 
+/// Where light is gathered, and by which points and directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Position, metres.
+    pub point: DVec3,
+    /// Unit normal.
+    pub normal: DVec3,
+    /// Flips of the bits of points and directions ([`super::hemisphere`]).
+    pub flips: [u32; 2],
+}
+
+impl Place {
+    /// With directions of its own.
+    pub fn new(point: DVec3, normal: DVec3) -> Place {
+        Place { point, normal, flips: flips(point) }
+    }
+}
+
 /// A face that emits.
 struct Lamp {
     corners: [DVec3; 3],
@@ -195,14 +213,13 @@ impl Lamps {
         &self,
         walker: &mut Walker,
         rays: &RayScene,
-        (point, normal): (DVec3, DVec3),
+        Place { point, normal, flips }: Place,
         (first, count): (u32, u32),
         samples: Samples,
     ) -> Lit {
         if self.is_empty() {
             return Lit::default();
         }
-        let flips = flips(point);
         let mut sum = Lit::default();
         for k in rays.in_order(first, count) {
             let x = in_square(k, flips);

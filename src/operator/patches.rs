@@ -4,8 +4,8 @@
 //! quarters of a square; smaller ones are taken together with others of the same object and material
 //! that lie in the same cube and face about the same way, a quarter of their area to a cell.
 //! Receivers are anywhere and know nothing of patches: these are but what the surface radiates, as
-//! coarsely as the sum over a hemisphere allows. Each cell has a spot where light is gathered for
-//! it; how spots of one patch differ tells whether it is to be split.
+//! coarsely as the sum over a hemisphere allows. Each cell has [`SPOTS`] points where light is gathered for
+//! it; how cells of one patch differ tells whether it is to be split.
 
 use std::collections::HashMap;
 
@@ -21,6 +21,10 @@ use crate::scene::{self, Scene};
 
 /// Cells of a patch, at most.
 pub const CELLS: usize = 4;
+
+/// Spots of a cell: of light that varies within it, their mean is far nearer to the cell's than
+/// one of them.
+pub const SPOTS: usize = 8;
 
 /// Sizes of patches, before they are split.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +54,7 @@ pub struct Patches {
     shapes: Vec<Shape>,
     /// Where the cells of each patch end: they are numbered one patch after the other.
     ends: Vec<usize>,
-    /// The spot of each cell.
+    /// The spots of each cell, [`SPOTS`] of them.
     spots: Vec<Spot>,
     /// Area of each cell, square metres.
     pub area: Vec<f64>,
@@ -104,10 +108,10 @@ struct Part {
     face: u32,
     /// The square that it fills, of a face that is cut; counted from its patch's first.
     quarter: u32,
+    /// Its corners: it is convex.
+    polygon: Vec<DVec2>,
     area: f64,
     centre: DVec2,
-    /// A point of it: the centre in round 0.
-    spot: DVec2,
     exitance: DVec3,
     reflectance: DVec3,
 }
@@ -221,17 +225,16 @@ impl Patches {
 
     /// Adds patches of the given shapes, but for empty ones.
     fn add(&mut self, scene: &Scene, mesh: &Mesh, shapes: Vec<Shape>) {
-        let round = self.round;
         let parts: Vec<Vec<Part>> = shapes
             .par_iter()
             .map(|shape| match shape {
                 Shape::Square { face, low, side, .. } => {
-                    quarters(scene, &mesh.faces[*face as usize], *face, (*low, *side), round)
+                    quarters(scene, &mesh.faces[*face as usize], *face, (*low, *side))
                 }
                 Shape::Cube { faces, .. } => {
                     let whole = |&f: &u32| {
                         let face = &mesh.faces[f as usize];
-                        part(scene, face, f, &face.corners, round)
+                        part(scene, face, f, &face.corners)
                     };
                     faces.iter().map(whole).collect()
                 }
@@ -255,25 +258,31 @@ impl Patches {
                     self.add_cell(own, &squares);
                 }
             }
-            self.ends.push(self.spots.len());
+            self.ends.push(self.area.len());
             self.shapes.push(shape);
         }
     }
 
-    /// Adds a cell of some parts, which fill `squares`. Its spot is in one of them.
+    /// Adds a cell of some parts, which fill `squares`. Its spots are in them.
     fn add_cell(&mut self, parts: &[Part], squares: &[u32]) {
         let area: f64 = parts.iter().map(|p| p.area).sum();
         let mean = |of: &dyn Fn(&Part) -> DVec3| -> DVec3 {
             parts.iter().map(|p| p.area * of(p)).sum::<DVec3>() / area
         };
-        let cell = self.spots.len() as u32;
-        let (mut sum, wanted) = (0.0, area * scattered(parts[0].centre, self.round)[2]);
-        let chosen = parts.iter().position(|p| {
-            sum += p.area;
-            sum >= wanted
-        });
-        let Part { face, spot, .. } = parts[chosen.unwrap_or(0)];
-        self.spots.push(Spot { face, x: spot });
+        let cell = self.area.len() as u32;
+        let begin = self.round * SPOTS as u32;
+        for number in begin..begin + SPOTS as u32 {
+            let [s, t, which] = scattered(parts[0].centre, number);
+            let mut left = which * area;
+            let chosen = parts.iter().position(|part| {
+                let inside = left <= part.area;
+                left -= if inside { 0.0 } else { part.area };
+                inside
+            });
+            let part = &parts[chosen.unwrap_or(0)];
+            let x = inside(&part.polygon, [s, t, left.clamp(0.0, part.area)]);
+            self.spots.push(Spot { face: part.face, x });
+        }
         self.exitance.push(mean(&|p| p.exitance));
         self.reflectance.push(mean(&|p| p.reflectance));
         self.area.push(area);
@@ -292,9 +301,14 @@ impl Patches {
         self.ends.is_empty()
     }
 
-    /// The spots of all cells.
-    pub fn spots(&self) -> &[Spot] {
-        &self.spots
+    /// How many cells all patches have.
+    pub fn count_of_cells(&self) -> usize {
+        self.area.len()
+    }
+
+    /// The spots of a cell.
+    pub fn spots(&self, cell: usize) -> &[Spot] {
+        &self.spots[SPOTS * cell..SPOTS * (cell + 1)]
     }
 
     /// The cells of a patch: 1 to [`CELLS`].
@@ -305,8 +319,9 @@ impl Patches {
 
     /// Puts the spots of a patch at other points of it, one or more.
     pub fn put_spots(&mut self, patch: usize, at: &[Spot]) {
-        for (k, cell) in self.cells(patch).enumerate() {
-            self.spots[cell] = at[k % at.len()];
+        let cells = self.cells(patch);
+        for (k, spot) in self.spots[SPOTS * cells.start..SPOTS * cells.end].iter_mut().enumerate() {
+            *spot = at[k % at.len()];
         }
     }
 
@@ -435,14 +450,14 @@ fn across(face: &Face, square: f64) -> DVec2 {
 }
 
 /// A convex part of a face, with what varies over it averaged.
-fn part(scene: &Scene, face: &Face, number: u32, polygon: &[DVec2], round: u32) -> Part {
+fn part(scene: &Scene, face: &Face, number: u32, polygon: &[DVec2]) -> Part {
     let triangle = face.triangle as usize;
     let mut own = Part {
         face: number,
         quarter: 0,
+        polygon: polygon.to_vec(),
         area: 0.0,
         centre: DVec2::ZERO,
-        spot: DVec2::ZERO,
         exitance: DVec3::ZERO,
         reflectance: DVec3::ZERO,
     };
@@ -456,34 +471,25 @@ fn part(scene: &Scene, face: &Face, number: u32, polygon: &[DVec2], round: u32) 
         own.reflectance += area * scene::reflectance(scene, triangle, &footprint);
     }
     own.centre /= own.area;
-    own.spot = if round == 0 {
-        own.centre
-    } else {
-        inside(polygon, own.area, scattered(own.centre, round))
-    };
     own.exitance /= own.area;
     own.reflectance /= own.area;
     own
 }
 
-/// Three numbers from 0 to 1 for what has its centre at x: halves in round 0, and evenly spread over
-/// rounds (Roberts 2018: multiples of powers of the plastic number's kin, g^4 = g + 1).
-fn scattered(x: DVec2, round: u32) -> [f64; 3] {
-    if round == 0 {
-        return [0.5; 3];
-    }
+/// Three numbers from 0 to 1 for what has its centre at x, evenly spread over numbers
+/// (Roberts 2018: multiples of powers of the plastic number's kin, g^4 = g + 1).
+fn scattered(x: DVec2, number: u32) -> [f64; 3] {
     let mut seed = mix(mix(x.x.to_bits()).wrapping_add(x.y.to_bits()));
     const G: f64 = 1.220_744_084_605_759_5;
     [G, G * G, G * G * G].map(|power| {
         seed = mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15));
         let own = (seed >> 11) as f64 / (1u64 << 53) as f64;
-        (own + f64::from(round) / power).fract()
+        (own + f64::from(number) / power).fract()
     })
 }
 
-/// The point of a convex polygon of this area that three numbers from 0 to 1 choose.
-fn inside(polygon: &[DVec2], area: f64, [s, t, which]: [f64; 3]) -> DVec2 {
-    let mut left = which * area;
+/// The point of a convex polygon that two numbers from 0 to 1 and one from 0 to its area choose.
+fn inside(polygon: &[DVec2], [s, t, mut left]: [f64; 3]) -> DVec2 {
     let mut k = 1;
     while k + 2 < polygon.len() {
         left -= 0.5 * twice_area(&[polygon[0], polygon[k], polygon[k + 1]]);
@@ -515,13 +521,7 @@ fn in_quarters(parts: &[Part]) -> Vec<&[Part]> {
 }
 
 /// The parts of a face in the four quarters of a square.
-fn quarters(
-    scene: &Scene,
-    face: &Face,
-    number: u32,
-    (low, side): (DVec2, f64),
-    round: u32,
-) -> Vec<Part> {
+fn quarters(scene: &Scene, face: &Face, number: u32, (low, side): (DVec2, f64)) -> Vec<Part> {
     let (mut pieces, half) = (Pieces::default(), 0.5 * side);
     let mut parts = vec![];
     for quarter in 0..4 {
@@ -536,7 +536,7 @@ fn quarters(
             pieces.push_clipped(&polygon, &Linear { g, c, uncertainty: 0.0 })
         });
         if inside {
-            let mut own = part(scene, face, number, pieces.get(pieces.len() - 1), round);
+            let mut own = part(scene, face, number, pieces.get(pieces.len() - 1));
             own.quarter = quarter;
             // Slivers of roundings have no centre.
             if own.area > 0.0 && own.centre.is_finite() {

@@ -14,8 +14,8 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::bundles::{Met, RayScene};
-use super::hemisphere::{direction, flips};
-use super::lamps::{Lamps, Lit, Samples};
+use super::hemisphere::{direction, flips_for};
+use super::lamps::{Lamps, Lit, Place, Samples};
 use super::patches::Patches;
 use super::walk::Walker;
 use crate::geometry::Frame;
@@ -62,6 +62,8 @@ impl RayRadiant {
 pub struct Sources<'a> {
     /// Light that patches reflect.
     pub reflected: Option<&'a RayRadiant>,
+    /// The same as it was known before, to be compared along the same rays.
+    pub before: Option<&'a RayRadiant>,
     /// Light that is emitted.
     pub emitted: Option<&'a Lamps>,
     /// All that emits: it lights what reflects.
@@ -84,6 +86,8 @@ pub struct Estimated {
     pub irradiance: DVec3,
     /// About how far it is off: from the deviations of parts.
     pub spread: DVec3,
+    /// What it is more than it would be with [`Sources::before`] by the same rays.
+    pub change: DVec3,
 }
 
 impl Estimated {
@@ -94,8 +98,16 @@ impl Estimated {
 
     /// Irradiance that is known.
     pub fn exactly(irradiance: DVec3) -> Estimated {
-        Estimated { irradiance, spread: DVec3::ZERO }
+        Estimated { irradiance, ..Estimated::default() }
     }
+}
+
+/// Whether so many blocks of rays are looked at: 1, 2, 3, 4, 6, 8, 12, ... in each part.
+fn is_looked_at(blocks: usize) -> bool {
+    let each = blocks / PARTS;
+    let is_step =
+        each.is_power_of_two() || (each.is_multiple_of(3) && (each / 3).is_power_of_two());
+    blocks.is_multiple_of(PARTS) && is_step
 }
 
 /// Parts of the rays whose deviations are looked at.
@@ -111,10 +123,17 @@ const OF_HALF: f64 = 1.681_792_830_507_429;
 const EVEN: f64 = 1.0;
 
 /// Ways that a ray goes on, at most.
-const MOST_BOUNCES: u32 = 8;
+const MOST_BOUNCES: u64 = 8;
 
 /// One ray and one point of what emits, over and over.
 const EACH: Samples = Samples { points: 1, rays: 1 };
+
+impl<'a> Sources<'a> {
+    /// Reflected light alone.
+    pub fn reflected(radiant: &'a RayRadiant, lamps: &'a Lamps) -> Sources<'a> {
+        Sources { reflected: Some(radiant), before: None, emitted: None, lamps }
+    }
+}
 
 impl Sources<'_> {
     /// Irradiance at a point with a unit normal from as many rays (and points of what emits) as it
@@ -123,17 +142,17 @@ impl Sources<'_> {
         &self,
         walker: &mut Walker,
         (scene, mesh): (&RayScene, &Mesh),
-        (point, normal): (DVec3, DVec3),
+        place: Place,
         allowed: f64,
         counts: RayCounts,
     ) -> Estimated {
+        let Place { point, normal, flips } = place;
         let frame = Frame::new(point, normal);
-        let flips = flips(point);
         let few = self.emitted.filter(|lamps| lamps.are_few());
         let unshadowed = few.map(|lamps| lamps.unshadowed(point, normal));
         let block = counts.least / PARTS as u32;
         let mut sums: Vec<Sum> = vec![];
-        let mut before = DVec3::ZERO;
+        let mut before = (DVec3::ZERO, 0);
         loop {
             let first = sums.len() as u32 * block;
             let mut sum = Sum::default();
@@ -148,20 +167,23 @@ impl Sources<'_> {
                     if let Some(radiant) = self.reflected {
                         let start = (face, x, square, cosine);
                         let rays = counts.least;
-                        sum.reflected +=
-                            self.along(radiant, walker, (scene, mesh), start, (k, rays));
+                        let (found, change) =
+                            self.along(radiant, walker, (scene, mesh), start, (k, rays, flips));
+                        sum.reflected += found;
+                        sum.change += change;
                     }
                     if let Some(lamps) = self.emitted {
-                        sum.lit.seen += lamps.met(face, square, cosine * towards.dot(normal), EACH);
+                        let cosines = cosine * towards.dot(normal);
+                        sum.lit.seen += lamps.met(face, square, cosines, EACH);
                     }
                 }
             }
             if let Some(lamps) = self.emitted {
                 let which = (first, block);
-                sum.lit += lamps.by_points(walker, scene, (point, normal), which, EACH);
+                sum.lit += lamps.by_points(walker, scene, place, which, EACH);
             }
             sums.push(sum);
-            if sums.len() >= PARTS && sums.len().is_power_of_two() {
+            if is_looked_at(sums.len()) {
                 let rays = sums.len() as u32 * block;
                 let irradiance = mean(&sums, rays, unshadowed);
                 let parts = sums.chunks(sums.len() / PARTS);
@@ -170,12 +192,13 @@ impl Sources<'_> {
                     .map(|off| off * off)
                     .sum();
                 let own = (squares / (PARTS - 1) as f64).map(f64::sqrt) / OF_PART;
-                // What ends it is small by chance at times: half as many rays told more.
-                let spread = own.max(before / OF_HALF);
-                if own.max_element() <= allowed || rays >= counts.most {
-                    return Estimated { irradiance, spread };
+                // What ends it is small by chance at times: what fewer rays told counts as well.
+                let spread = own.max(before.0 * (f64::from(before.1) / f64::from(rays)).powf(0.75));
+                if spread.max_element() <= allowed || rays >= counts.most {
+                    let change: DVec3 = sums.iter().map(|own| own.change).sum();
+                    return Estimated { irradiance, spread, change: change / f64::from(rays) };
                 }
-                before = own;
+                before = (own, rays);
             }
         }
     }
@@ -184,27 +207,34 @@ impl Sources<'_> {
 impl Sources<'_> {
     /// The radiosity that ray `number` of a bundle of `rays` finds where it met a face (at a point, a
     /// distance squared and a cosine): that of the cell, or, where that is too uneven, of the point.
+    /// And what it is more than before.
     fn along(
         &self,
         radiant: &RayRadiant,
         walker: &mut Walker,
         (scene, mesh): (&RayScene, &Mesh),
         (mut face, mut x, mut square, mut cosine): (u32, DVec2, f64, f64),
-        (number, rays): (u32, u32),
-    ) -> DVec3 {
-        let (mut sum, mut weight) = (DVec3::ZERO, DVec3::ONE);
-        for bounce in 0.. {
+        (number, rays, flips): (u32, u32, [u32; 2]),
+    ) -> (DVec3, DVec3) {
+        let (mut sum, mut weight, mut change) = (DVec3::ZERO, DVec3::ONE, DVec3::ZERO);
+        for bounce in 0u64.. {
             let cell = radiant.patches.at(face, x);
             if bounce == MOST_BOUNCES || radiant.is_even(cell, square, cosine, rays) {
-                sum += weight * radiant.radiosity[cell];
+                let own = radiant.radiosity[cell];
+                sum += weight * own;
+                if let Some(before) = self.before {
+                    change = weight * (own - before.radiosity[before.patches.at(face, x)]);
+                }
                 break;
             }
             weight *= radiant.patches.reflectance[cell];
             let own = &mesh.faces[face as usize].frame;
             let (point, normal) = (own.lift(x), own.n);
-            let lit = self.lamps.by_points(walker, scene, (point, normal), (number, 1), EACH);
+            let flips = flips_for(flips, u64::from(number) << 8 | bounce);
+            let place = Place { point, normal, flips };
+            let lit = self.lamps.by_points(walker, scene, place, (number, 1), EACH);
             sum += weight * lit.seen;
-            let towards = direction(own, number, flips(point));
+            let towards = direction(own, number, flips);
             let Met::Face { face: next, x: at, square: far, cosine: from } =
                 scene.cast(walker, mesh, point, towards)
             else {
@@ -213,7 +243,7 @@ impl Sources<'_> {
             sum += weight * self.lamps.met(next, far, from * towards.dot(normal), EACH);
             (face, x, square, cosine) = (next, at, far, from);
         }
-        sum
+        (sum, change)
     }
 }
 
@@ -221,6 +251,7 @@ impl Sources<'_> {
 #[derive(Clone, Copy, Default)]
 struct Sum {
     reflected: DVec3,
+    change: DVec3,
     lit: Lit,
 }
 

@@ -22,6 +22,14 @@ const FEW: usize = 9;
 /// Fewer than these are gathered each, even where corners and middle of a triangle would do.
 const FEWEST: usize = 5;
 
+/// Up to so many may be filled in from three of them, those so far beyond three of these, in units of
+/// their triangle's weights.
+const SMALL: usize = 48;
+const BEYOND: f64 = 0.75;
+
+/// How many points are looked at where regions may lie beside the surface.
+const LOOKED_AT: usize = 3;
+
 /// Most points of a task of its own.
 const TASK: usize = 1024;
 
@@ -91,7 +99,8 @@ const OF_CHECK: f64 = 0.3;
 
 /// Values at points, region by region in the order given: gathered, or filled in where the check finds
 /// no difference above `allowed` in any channel. With `allowed` 0 every point is gathered. Where
-/// `small`, regions of few points are filled in too, with a check in the middle only.
+/// `small`, regions of few points are filled in too, with a single check, and regions may lie beside the
+/// surface: values are checked at points that were asked for.
 ///
 /// `open` (root, triangle in its face's plane, what was made for a triangle around it) makes what
 /// points of a triangle share; `gather` (that, root, point) gathers. `most` says how many points of a
@@ -239,35 +248,73 @@ impl<O, G, M> Filler<O, G, M> {
         Ok(())
     }
 
-    /// A few points from the corners and the middle of a triangle; whether that was right.
+    /// Some points from those of them that are nearest to the corners of a triangle; whether that was
+    /// right for those nearest to the middles of its sides and of itself.
     fn fan<B>(&mut self, corners: &[DVec2; 3], shared: &B, points: &[Asked]) -> Result<bool>
     where
         G: FnMut(&B, DVec2) -> Result<Estimated>,
     {
-        let mut at = [DVec3::ZERO; 3];
-        let mut spread = DVec3::ZERO;
-        for (value, x) in at.iter_mut().zip(corners) {
-            let found = self.value(shared, *x)?;
-            *value = found.irradiance;
-            spread += found.spread * found.spread / 4.0;
-        }
-        let middle = self.value(shared, (corners[0] + corners[1] + corners[2]) / 3.0)?;
-        spread += middle.spread * middle.spread / 4.0;
-        let off = ((at[0] + at[1] + at[2]) / 3.0 - middle.irradiance).abs();
-        if off.max_element() > self.allowed {
+        let [a, b, c] = *corners;
+        let nearest = |to: DVec2| {
+            let distance = |k: &usize| points[*k].x.distance_squared(to);
+            (0..points.len()).min_by(|i, j| distance(i).total_cmp(&distance(j))).unwrap_or(0)
+        };
+        let chosen = corners.map(nearest);
+        let own = chosen.map(|k| points[k].x);
+        let checks = [(a + b + c) / 3.0, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)].map(nearest);
+        let weights: Vec<DVec3> = points.iter().map(|p| barycentric(&own, p.x)).collect();
+        // Not where it would be far beyond them, or they are in a line.
+        let is_near = |w: &DVec3| w.min_element() >= -BEYOND && w.max_element() <= 1.0 + BEYOND;
+        if chosen.contains(&checks[0]) || !weights.iter().all(is_near) {
             return Ok(false);
         }
-        self.done.largest = self.done.largest.max(off.max_element());
-        self.done.squares += points.len() as f64 * (OF_CHECK * OF_CHECK * off * off + spread);
-        for point in points {
-            // Linear from the middle to each side.
-            let w = barycentric(corners, point.x);
-            let least = w.min_element();
-            let value = (w.x - least) * at[0]
-                + (w.y - least) * at[1]
-                + (w.z - least) * at[2]
-                + 3.0 * least * middle.irradiance;
-            self.done.values.push((point.place, value));
+        let mut at = [DVec3::ZERO; 3];
+        let mut spread = DVec3::ZERO;
+        for (value, x) in at.iter_mut().zip(own) {
+            let found = self.value(shared, x)?;
+            *value = found.irradiance;
+            spread += found.spread * found.spread / 3.0;
+        }
+        let linear = |w: &DVec3| w.x * at[0] + w.y * at[1] + w.z * at[2];
+        let (mut largest, mut squares) = (0.0f64, DVec3::ZERO);
+        for k in 0..checks.len() {
+            let check = checks[k];
+            if chosen.contains(&check) || checks[..k].contains(&check) {
+                continue;
+            }
+            let found = self.value(shared, points[check].x)?.irradiance;
+            let off = (linear(&weights[check]) - found).abs();
+            if off.max_element() > self.allowed {
+                return Ok(false);
+            }
+            largest = largest.max(off.max_element());
+            squares = squares.max(off * off);
+        }
+        self.done.largest = self.done.largest.max(largest);
+        self.done.squares += points.len() as f64 * (OF_CHECK * OF_CHECK * squares + spread);
+        for (point, w) in points.iter().zip(&weights) {
+            self.done.values.push((point.place, linear(w)));
+        }
+        Ok(true)
+    }
+
+    /// Whether what was filled in is right at some of the points themselves: nodes may lie beside the
+    /// surface.
+    fn is_right_at<B>(
+        &mut self,
+        shared: &B,
+        points: &[Asked],
+        filled: impl Fn(DVec2) -> DVec3,
+    ) -> Result<bool>
+    where
+        G: FnMut(&B, DVec2) -> Result<Estimated>,
+    {
+        for k in 0..LOOKED_AT {
+            let x = points[(2 * k + 1) * points.len() / (2 * LOOKED_AT)].x;
+            let off = (self.value(shared, x)?.irradiance - filled(x)).abs();
+            if off.max_element() > self.allowed {
+                return Ok(false);
+            }
         }
         Ok(true)
     }
@@ -286,11 +333,15 @@ impl<O, G, M> Filler<O, G, M> {
         G: FnMut(&B, DVec2) -> Result<Estimated>,
     {
         let cost = if six.is_some() { FEW } else { FEW + 6 };
-        if points.len() <= cost || self.allowed == 0.0 || levels == 0 {
-            let fan = self.small && six.is_none() && points.len() > FEWEST;
-            if fan && self.fan(corners, shared, points)? {
-                return Ok(());
-            }
+        let fills = self.allowed > 0.0 && levels > 0;
+        if fills
+            && self.small
+            && (FEWEST + 1..=SMALL).contains(&points.len())
+            && self.fan(corners, shared, points)?
+        {
+            return Ok(());
+        }
+        if points.len() <= cost || !fills {
             return self.each(shared, points);
         }
         let [a, b, c] = *corners;
@@ -319,14 +370,19 @@ impl<O, G, M> Filler<O, G, M> {
             spread += found.spread * found.spread / NINE.len() as f64;
         }
         let four = children(&six, &nine);
+        let filled = |x: DVec2| {
+            let k = part_of(corners, x);
+            quadratic(&four[k], barycentric(&child(corners, k), x))
+        };
         let right = worst <= self.allowed;
-        if right && points.len() <= (self.most)(shared) {
+        if right
+            && points.len() <= (self.most)(shared)
+            && (!self.small || self.is_right_at(shared, points, filled)?)
+        {
             self.done.largest = self.done.largest.max(worst);
             self.done.squares += points.len() as f64 * (OF_CHECK * OF_CHECK * squares + spread);
             for point in points.iter() {
-                let k = part_of(corners, point.x);
-                let w = barycentric(&child(corners, k), point.x);
-                self.done.values.push((point.place, quadratic(&four[k], w)));
+                self.done.values.push((point.place, filled(point.x)));
             }
             return Ok(());
         }

@@ -8,6 +8,8 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::operator::beam::{Beam, Patch};
 use crate::operator::gather::Radiant;
+use crate::operator::hemisphere::flips;
+use crate::operator::lamps::Place;
 use crate::operator::ray_gather::{Estimated, Sources};
 use crate::solve::{ApartSource, Light, RaySource, Reflected};
 
@@ -17,9 +19,15 @@ use crate::solve::{ApartSource, Light, RaySource, Reflected};
 /// with strong contrasts 0.3.
 const CHECKED: f64 = 3.0;
 
+/// The same where light is gathered by rays: noise of neighbours is alike.
+const CHECKED_BY_RAYS: f64 = 2.0;
+
 /// Where something stands between an emitter and some of the points, at most so many of them are
 /// filled in at once: the shadow of something thin could lie between the nodes.
 const SHADED: usize = 32;
+
+/// By rays nothing tells what stands around: at most so many points are filled in at once.
+const AT_ONCE: usize = 512;
 
 /// What was done for direct and for indirect light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,8 +72,19 @@ pub fn irradiances(
     asked: &[RootPoints],
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, IrradianceCounts)> {
-    if let Some((source, rays, sources)) = of_rays(light) {
-        let (values, direct) = from_rays(light, source, rays, &sources, asked, monitor)?;
+    irradiances_against(light, asked, 1.0, monitor)
+}
+
+/// The same where errors of rays, and of filling in between their points, may be so many times as
+/// large: for points that are much brighter than the surface is on the whole.
+pub fn irradiances_against(
+    light: &Light,
+    asked: &[RootPoints],
+    brighter: f64,
+    monitor: &Monitor,
+) -> Result<(Vec<Vec<DVec3>>, IrradianceCounts)> {
+    if let Some(by_rays) = ByRays::of(light) {
+        let (values, direct) = by_rays.scaled(brighter).gather(light, asked, |e| e, monitor)?;
         return Ok((values, IrradianceCounts { direct, ..IrradianceCounts::default() }));
     }
     let (mut values, direct) = irradiances_of(light, Part::Direct, asked, monitor)?;
@@ -119,9 +138,9 @@ pub fn irradiances_of(
     let checked = checked(source);
     match part {
         Part::Direct => {
-            if let Some((source, rays, sources)) = of_rays(light) {
-                let emitted = Sources { reflected: None, ..sources };
-                return from_rays(light, source, rays, &emitted, asked, monitor);
+            if let Some(mut by_rays) = ByRays::of(light) {
+                by_rays.sources.reflected = None;
+                return by_rays.gather(light, asked, |e| e, monitor);
             }
             let how = (source.allowed_direct, checked, SHADED);
             from_radiant(light, &source.emitters, how, asked, monitor)
@@ -136,6 +155,11 @@ pub fn changes(light: &Light, asked: &[RootPoints], monitor: &Monitor) -> Result
     let zero = || asked.iter().map(|own| vec![DVec3::ZERO; own.points.len()]).collect();
     let Some(source) = light.apart() else { return Ok(zero()) };
     let Some(coarser) = &source.coarser else { return Ok(zero()) };
+    if let (Some(mut by_rays), Reflected::Rays(before)) = (ByRays::of(light), coarser) {
+        (by_rays.sources.before, by_rays.sources.emitted) = (Some(before), None);
+        let change = |found: Estimated| Estimated::exactly(found.change.abs());
+        return Ok(by_rays.gather(light, asked, change, monitor)?.0);
+    }
     let from = |reflected| from_reflected(light, source, reflected, asked, monitor).map(|(v, _)| v);
     let (mut values, before) = (from(&source.reflected)?, from(coarser)?);
     for (value, before) in values.iter_mut().flatten().zip(before.into_iter().flatten()) {
@@ -159,14 +183,14 @@ fn from_reflected(
     asked: &[RootPoints],
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
-    match (reflected, &source.rays) {
+    match (reflected, ByRays::of(light)) {
         (Reflected::Cells(radiant), _) => {
             let how = (source.allowed, checked(source), usize::MAX);
             from_radiant(light, radiant, how, asked, monitor)
         }
-        (Reflected::Rays(radiant), Some(rays)) => {
-            let sources = Sources { reflected: Some(radiant), emitted: None, lamps: &rays.lamps };
-            from_rays(light, source, rays, &sources, asked, monitor)
+        (Reflected::Rays(_), Some(mut by_rays)) => {
+            by_rays.sources.emitted = None;
+            by_rays.gather(light, asked, |e| e, monitor)
         }
         (Reflected::Rays(_), None) => {
             let zeros = asked.iter().map(|own| vec![DVec3::ZERO; own.points.len()]).collect();
@@ -175,43 +199,77 @@ fn from_reflected(
     }
 }
 
-/// What light that was solved for with rays is gathered from.
-fn of_rays(light: &Light) -> Option<(&ApartSource, &RaySource, Sources<'_>)> {
-    let source = light.apart()?;
-    let (Reflected::Rays(radiant), Some(rays)) = (&source.reflected, &source.rays) else {
-        return None;
-    };
-    Some((
-        source,
-        rays,
-        Sources { reflected: Some(radiant), emitted: Some(&rays.lamps), lamps: &rays.lamps },
-    ))
+/// How light that was solved for with rays is gathered.
+struct ByRays<'a> {
+    source: &'a ApartSource,
+    rays: &'a RaySource,
+    sources: Sources<'a>,
+    /// How far off a point may be, W/m^2, and what is checked where values are filled in.
+    allowed: f64,
+    checked: f64,
 }
 
-fn from_rays(
+impl<'a> ByRays<'a> {
+    fn of(light: &'a Light) -> Option<ByRays<'a>> {
+        let source = light.apart()?;
+        let (Reflected::Rays(radiant), Some(rays)) = (&source.reflected, &source.rays) else {
+            return None;
+        };
+        let sources =
+            Sources { emitted: Some(&rays.lamps), ..Sources::reflected(radiant, &rays.lamps) };
+        let checked = CHECKED_BY_RAYS / CHECKED * checked(source);
+        Some(ByRays { source, rays, sources, allowed: source.allowed, checked })
+    }
+
+    fn scaled(mut self, times: f64) -> ByRays<'a> {
+        self.allowed *= times;
+        self.checked *= times;
+        self
+    }
+
+    /// What there is `of` what is found at some points.
+    fn gather(
+        &self,
+        light: &Light,
+        asked: &[RootPoints],
+        of: impl Fn(Estimated) -> Estimated + Sync,
+        monitor: &Monitor,
+    ) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
+        let stage = light.stage();
+        let emitters = (&self.source.emitters, self.source.allowed_direct);
+        let sheets = Sheets::new(&light.mesh, asked);
+        let (values, counts) = fill(
+            &sheets.regions,
+            (self.checked, true),
+            |_, _, _| (),
+            |walker, (), root, x| {
+                let frame = light.mesh.root_frame(root);
+                let flips = flips(frame.lift(DVec2::ZERO));
+                let place = Place { point: frame.lift(x), normal: frame.n, flips };
+                of(self.rays.gather(&self.sources, emitters, walker, stage, place, self.allowed))
+            },
+            |()| AT_ONCE,
+            monitor,
+        )?;
+        Ok((sheets.in_order(asked, values), counts))
+    }
+}
+
+/// How many times as bright as the mean of the surface some points are, at least once, from as few
+/// rays as say so; 1 where light is not gathered by rays. `weights` are in the order of the points.
+pub fn brightness(
     light: &Light,
-    source: &ApartSource,
-    rays: &RaySource,
-    sources: &Sources,
     asked: &[RootPoints],
+    weights: &[f64],
     monitor: &Monitor,
-) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
-    let stage = light.stage();
-    let emitters = (&source.emitters, source.allowed_direct);
-    let sheets = Sheets::new(&light.mesh, asked);
-    let (values, counts) = fill(
-        &sheets.regions,
-        (checked(source), true),
-        |_, _, _| (),
-        |walker, (), root, x| {
-            let frame = light.mesh.root_frame(root);
-            let place = (frame.lift(x), frame.n);
-            rays.gather(sources, emitters, walker, stage, place, source.allowed)
-        },
-        |()| usize::MAX,
-        monitor,
-    )?;
-    Ok((sheets.in_order(asked, values), counts))
+) -> Result<f64> {
+    let Some(by_rays) = ByRays::of(light) else { return Ok(1.0) };
+    let mean = by_rays.source.estimate.mean;
+    let few = ByRays { allowed: f64::INFINITY, checked: 0.0, ..by_rays };
+    let (values, _) = few.gather(light, asked, |e| e, monitor)?;
+    let all: DVec3 = values.iter().flatten().zip(weights).map(|(v, w)| *w * *v).sum();
+    let all = all.max_element() / weights.iter().sum::<f64>();
+    Ok(if all > mean.max_element() { all / mean.max_element() } else { 1.0 })
 }
 
 fn from_radiant(

@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::mesh::Face;
 use crate::monitor::Monitor;
 use crate::reconstruct::fill::RootPoints;
-use crate::reconstruct::irradiance::{IrradianceCounts, changes, irradiances};
+use crate::reconstruct::irradiance::{IrradianceCounts, brightness, changes, irradiances_against};
 use crate::reconstruct::{Surface, VertexIrradiance};
 use crate::scene::{self, Camera, Scene};
 use crate::solve::Light;
@@ -27,6 +27,9 @@ pub use camera_rays::{CameraRays, Ray};
 /// About how many pixels are gathered together: what lies between is filled in, and is held in
 /// memory.
 const BAND: usize = 1 << 21;
+
+/// So many pixels each way tell how bright a picture is.
+const LOOKED: f64 = 20.0;
 
 /// What is drawn, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +45,23 @@ pub struct RenderOptions {
     pub gather: bool,
 }
 
+/// How much was gathered for a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gathered {
+    /// Points, and what they are off by.
+    pub counts: IrradianceCounts,
+    /// The mean irradiance that this is allowed relative to, W/m^2: that of the surface, or, where light
+    /// is gathered by rays and the picture is brighter, of what it shows.
+    pub against: DVec3,
+}
+
+impl Gathered {
+    /// Root mean square error of the irradiance by filling in and rays, relative to [`Gathered::against`].
+    pub fn error(&self) -> f64 {
+        self.counts.error(self.against)
+    }
+}
+
 /// Radiance of each pixel, W/(m^2 sr), row by row from the top left; and how much was gathered for
 /// it.
 pub fn render(
@@ -50,15 +70,17 @@ pub fn render(
     camera: &Camera,
     options: &RenderOptions,
     monitor: &Monitor,
-) -> Result<(Vec<[f32; 3]>, IrradianceCounts)> {
+) -> Result<(Vec<[f32; 3]>, Gathered)> {
     let surface = Surface::new(scene, &light.mesh);
     let mut painter = Painter::new(scene, light, camera, options, &surface);
     if options.gather || light.apart().is_some() {
+        let mean = light.apart().map_or(DVec3::ZERO, |source| source.estimate.mean);
+        let brighter = painter.brightness(options, monitor)?;
         let mut counts = IrradianceCounts::default();
         let pixels = painter.gathered(
             options,
             |asked| {
-                let (values, own) = irradiances(light, asked, monitor)?;
+                let (values, own) = irradiances_against(light, asked, brighter, monitor)?;
                 counts += own;
                 Ok(values)
             },
@@ -68,7 +90,7 @@ pub fn render(
             },
             monitor,
         )?;
-        return Ok((pixels, counts));
+        return Ok((pixels, Gathered { counts, against: brighter * mean }));
     }
     painter.vertices = Some(VertexIrradiance::new(&light.mesh, &light.solution.irradiance));
     let stage = monitor.stage("render", u64::from(options.height));
@@ -85,7 +107,7 @@ pub fn render(
             Ok(row)
         })
         .collect::<Result<_>>()?;
-    Ok((rows.concat(), IrradianceCounts::default()))
+    Ok((rows.concat(), Gathered::default()))
 }
 
 /// The estimated error of the irradiance at each pixel, relative to its mean over the surface, for
@@ -194,6 +216,22 @@ impl<'a> Painter<'a> {
             }
         }
         Ok(pixels)
+    }
+
+    /// How many times as bright as the whole surface what the picture shows is, by some pixels.
+    fn brightness(&self, options: &RenderOptions, monitor: &Monitor) -> Result<f64> {
+        let (mut asked, mut weights) = (vec![], vec![]);
+        let middle = |k: u32, size: u32| ((f64::from(k) + 0.5) * f64::from(size) / LOOKED) as u32;
+        for k in 0..(LOOKED * LOOKED) as u32 {
+            let (i, j) = (k % LOOKED as u32, k / LOOKED as u32);
+            let (x, y) = (middle(i, options.width), middle(j, options.height));
+            for patch in self.patches(x, y) {
+                let points = vec![patch.place / patch.count];
+                asked.push(RootPoints { root: patch.root, points });
+                weights.push(patch.count);
+            }
+        }
+        brightness(self.light, &asked, &weights, monitor)
     }
 
     /// The patches of the pixels of some rows, and where those of each pixel end.

@@ -13,7 +13,7 @@ use crate::operator::bundles::RayScene;
 use crate::operator::clustered::ClusteredSource;
 use crate::operator::fast::FitSource;
 use crate::operator::gather::Radiant;
-use crate::operator::lamps::Lamps;
+use crate::operator::lamps::{Lamps, Place};
 use crate::operator::ray_gather::{Estimated, RayCounts, RayRadiant, Sources};
 use crate::operator::walk::{Stage, Walker, gather};
 use crate::operator::{Operator, OperatorKind};
@@ -220,7 +220,7 @@ impl RaySource {
         (emitters, allowed_direct): (&Radiant, f64),
         walker: &mut Walker,
         stage: Stage,
-        place: (DVec3, DVec3),
+        place: Place,
         allowed: f64,
     ) -> Estimated {
         let scene = (&self.scene, stage.mesh);
@@ -237,13 +237,13 @@ impl RaySource {
                 return found;
             }
         }
-        let direct = emitters.gather(walker, stage, place.0, place.1, allowed_direct);
+        let direct = emitters.gather(walker, stage, place.point, place.normal, allowed_direct);
         if sources.reflected.is_none() {
             return Estimated::exactly(direct);
         }
         let reflected = Sources { emitted: None, ..*sources };
         let more = reflected.gather(walker, scene, place, allowed, self.counts);
-        Estimated { irradiance: direct + more.irradiance, spread: more.spread }
+        Estimated { irradiance: direct + more.irradiance, ..more }
     }
 }
 
@@ -262,9 +262,8 @@ impl ApartSource {
                 radiant.gather(walker, stage, point, normal, self.allowed)
             }
             (Reflected::Rays(radiant), Some(rays)) => {
-                let sources =
-                    Sources { reflected: Some(radiant), emitted: None, lamps: &rays.lamps };
-                let (scene, place) = ((&rays.scene, stage.mesh), (point, normal));
+                let sources = Sources::reflected(radiant, &rays.lamps);
+                let (scene, place) = ((&rays.scene, stage.mesh), Place::new(point, normal));
                 sources.gather(walker, scene, place, self.allowed, rays.counts).irradiance
             }
             (Reflected::Rays(_), None) => DVec3::ZERO,
