@@ -217,3 +217,22 @@ fn the_room_agrees() {
     // Tight, since single points are off by several times the root mean square over the surface.
     check("room", 1e-3);
 }
+
+#[test]
+fn an_arcade_of_many_faces_agrees() {
+    // Single points have noise of rays: root mean squares are compared.
+    let tolerance = 0.03;
+    let (scene, light, data) = prepared("arcade", tolerance);
+    let points = pairs_of_points(&scene, &light, &data);
+    bound_offsets(&data, &points);
+    let mean = light.apart().unwrap().estimate.mean;
+    let (mut squares, mut theirs) = (DVec3::ZERO, DVec3::ZERO);
+    for p in &points {
+        squares += ((p.ours - p.theirs) / mean).powf(2.0) / points.len() as f64;
+        theirs += (p.error / mean).powf(2.0) / points.len() as f64;
+    }
+    let (error, noise) = (squares.max_element().sqrt(), theirs.max_element().sqrt());
+    println!("arcade: {error:.2e} with noise of {noise:.1e}");
+    let allowed = 1.0 + ERRORS / (2.0 * points.len() as f64).sqrt();
+    assert!(error <= allowed * tolerance.hypot(noise), "{error:e}");
+}

@@ -218,7 +218,7 @@ impl<'a> ByRays<'a> {
         let sources =
             Sources { emitted: Some(&rays.lamps), ..Sources::reflected(radiant, &rays.lamps) };
         let checked = CHECKED_BY_RAYS / CHECKED * checked(source);
-        Some(ByRays { source, rays, sources, allowed: source.allowed, checked })
+        Some(ByRays { source, rays, sources, allowed: rays.allowed, checked })
     }
 
     fn scaled(mut self, times: f64) -> ByRays<'a> {

@@ -95,6 +95,8 @@ pub struct RaySource {
     pub share: f64,
     /// What they are off by at the samples, root mean square, relative to the mean irradiance.
     pub error: f64,
+    /// What they may be off by at each of many points, W/m^2: what the solution left of the tolerance.
+    pub allowed: f64,
 }
 
 /// A solution with direct light apart, made to a tolerance.

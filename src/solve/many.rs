@@ -57,12 +57,9 @@ const COARSE: f64 = 0.25;
 
 /// The error over the change: what is left once all that differs by chance is gone from the second
 /// solution (0.7), what is not halved by patches of half the size, and what was not split has not
-/// changed. In a kitchen of 62,000 faces the true error was 0.8 to 1.1 times what this estimates, in
-/// an arcade of 5,000 0.7 to 0.85 times.
-const OF_CHANGE: f64 = 1.5;
-
-/// What any point may be off by for want of rays, in units of what the solution left of the tolerance.
-const OF_LEFT: f64 = 1.0;
+/// changed. By a path tracer the true error was 1.04 times what this estimates in a kitchen of 62,000
+/// faces, 0.7 to 0.8 times in an arcade of 5,000.
+const OF_CHANGE: f64 = 1.75;
 
 /// Most steps of the ladder.
 const MOST_STEPS: u32 = 7;
@@ -83,13 +80,17 @@ pub fn forecast(scene: &Scene, base: &Mesh, tolerance: f64) -> Result<u64> {
     let cells = Patches::build(scene, base, &sizes)?.count_of_cells() as f64;
     let rays = f64::from(rays(RAYS_OF_SPOT, tolerance));
     let row = ENTRY_BYTES * OF_RAYS * rays + ROW_BYTES;
-    Ok((MORE_CELLS * cells * row) as u64)
+    let last = (MORE_CELLS * cells + ANY_CELLS).min(MOST_CELLS * cells);
+    Ok((last * row) as u64)
 }
 
-/// How many cells the last patches have for each of the first, and what share of a spot's rays meet
-/// a cell of their own: measured in a kitchen of 62,000 triangles at 1 %. Where the tolerance is not met
-/// it is several times as many.
-const MORE_CELLS: f64 = 3.2;
+/// How many cells the last patches have: for each of the first, and in any scene, for splitting goes where
+/// light varies, not where faces are; but at most so many times the first. And what share of a cell's
+/// rays meet a cell of their own. At 1 %, over what it takes: arcades of 5,000, 50,000 and 250,000
+/// triangles 0.8, 0.7 and 0.9, a kitchen of 62,000 1.5.
+const MORE_CELLS: f64 = 1.6;
+const ANY_CELLS: f64 = 157_000.0;
+const MOST_CELLS: f64 = 12.0;
 const OF_RAYS: f64 = 0.57;
 
 /// Bytes of a row, and of each cell that it has.
@@ -135,6 +136,7 @@ pub fn light_of_many(
         counts: ladder_counts(options.tolerance),
         share: 0.0,
         error: 0.0,
+        allowed: 0.0,
     };
     let lamps = &rays.lamps;
     let sources = Sources { reflected: None, before: None, emitted: Some(lamps), lamps };
@@ -162,9 +164,10 @@ pub fn light_of_many(
     (rays.share, rays.error) = (reflected, spread);
     let met = estimate.rms <= options.tolerance;
     let out_of_time = matches!(why, Some(Error::TimeLimit(_)));
-    let wanted = options.tolerance;
-    let left = (wanted * wanted - estimate.rms * estimate.rms).max(0.0).sqrt();
-    let allowed = (OF_LEFT * left).max(share::GATHER * wanted) * estimate.mean.max_element();
+    let unit = options.tolerance * estimate.mean.max_element();
+    let allowed = share::GATHER * unit;
+    let solved = (estimate.rms / options.tolerance).min(1.0);
+    rays.allowed = ((1.0 - solved * solved).sqrt() * unit).max(allowed);
     let (reflectance, exitance) = mesh::appearance(scene, &base);
     let irradiance: Vec<DVec3> = (0..base.nodes())
         .map(|node| {
@@ -190,7 +193,7 @@ pub fn light_of_many(
         coarser: coarser.map(Reflected::Rays),
         rays: Some(rays),
         allowed,
-        allowed_direct: share::EMITTER * wanted * estimate.mean.max_element(),
+        allowed_direct: share::EMITTER * unit,
         estimate,
         tolerance: options.tolerance,
         shortfall: if met { None } else { Some(why_not(why)) },

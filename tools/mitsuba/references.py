@@ -2,7 +2,7 @@
 
     .venv/mitsuba/bin/python tools/mitsuba/references.py [NAME...]
 
-For scenes/NAME.gltf (by default cornell, paper and room) writes tests/data/mitsuba_NAME.json:
+For scenes/NAME.gltf (by default all of SCENES) writes tests/data/mitsuba_NAME.json:
 
 - `points`: irradiance at POINTS places. A face is drawn with a chance proportional to the root of
   its area (so that small ones are seen too), then a place on it evenly, by NumPy's default
@@ -15,7 +15,7 @@ For scenes/NAME.gltf (by default cornell, paper and room) writes tests/data/mits
   `path` integrator differs by, whose offsets are larger still. The first is ten times the bias of
   what is stored.
 
-All standard errors are those of means of independent samples. Takes about 10 CPU minutes.
+All standard errors are those of means of independent samples. Takes about 15 CPU minutes.
 """
 
 import json
@@ -30,6 +30,7 @@ SCENES = {
     "cornell": (1, 1 << 21, 1 << 12),
     "paper": (2, 1 << 22, 1 << 12),
     "room": (3, 1 << 21, 1 << 12),
+    "arcade": (4, 1 << 20, 1 << 10),
 }
 POINTS = 64
 WIDTH, HEIGHT, ACROSS = 32, 24, 4
