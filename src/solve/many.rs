@@ -57,9 +57,8 @@ const COARSE: f64 = 0.25;
 
 /// The error over the change: what is left once all that differs by chance is gone from the second
 /// solution (0.7), what is not halved by patches of half the size, and what was not split has not
-/// changed. By a path tracer the true error was 1.04 times what this estimates in a kitchen of 62,000
-/// faces, 0.7 to 0.8 times in an arcade of 5,000.
-const OF_CHANGE: f64 = 1.75;
+/// changed.
+const OF_CHANGE: f64 = 1.5;
 
 /// Most steps of the ladder.
 const MOST_STEPS: u32 = 7;
