@@ -117,7 +117,7 @@ const PARTS: usize = 8;
 /// off by together: as if they had nothing to do with each other. For smooth light it would be the
 /// power 3/4 of their number, but cells of clutter are not smooth: measured in a kitchen, that
 /// promised half of the true error.
-const OF_PART: f64 = 2.828_427_124_746_190;
+const OF_PART: f64 = 2.0 * std::f64::consts::SQRT_2;
 const OF_HALF: f64 = std::f64::consts::SQRT_2;
 
 /// Rays go on where the square of what a cell's light varies by, relative, times the number of those
