@@ -72,19 +72,29 @@ pub fn irradiances(
     asked: &[RootPoints],
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, IrradianceCounts)> {
-    irradiances_against(light, asked, 1.0, monitor)
+    irradiances_shown(light, asked, &Shown { brighter: 1.0, slack: vec![] }, monitor)
 }
 
-/// The same where errors of rays, and of filling in between their points, may be so many times as
-/// large: for points that are much brighter than the surface is on the whole.
-pub fn irradiances_against(
+/// How far off points may be, where light is gathered by rays: errors of these, and of filling in between
+/// their points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// Everywhere so many times as far: for points much brighter than the surface is on the whole.
+    pub brighter: f64,
+    /// And so many times by root, as they are asked for (1 where there is nothing): where little of
+    /// what is off will be seen.
+    pub slack: Vec<f64>,
+}
+
+/// [`irradiances`] for points that are `shown`. Errors are counted over the slack of their roots.
+pub fn irradiances_shown(
     light: &Light,
     asked: &[RootPoints],
-    brighter: f64,
+    shown: &Shown,
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, IrradianceCounts)> {
     if let Some(by_rays) = ByRays::of(light) {
-        let (values, direct) = by_rays.scaled(brighter).gather(light, asked, |e| e, monitor)?;
+        let (values, direct) = by_rays.shown(shown).gather(light, asked, |e| e, monitor)?;
         return Ok((values, IrradianceCounts { direct, ..IrradianceCounts::default() }));
     }
     let (mut values, direct) = irradiances_of(light, Part::Direct, asked, monitor)?;
@@ -127,7 +137,7 @@ pub fn irradiances_of(
             &regions(light, asked),
             (0.0, false),
             |_, _, _| (),
-            |walker, (), root, x| {
+            |walker, (), (root, _), x| {
                 let (point, normal) = place(root, x);
                 Estimated::exactly(light.irradiance(walker, point, normal))
             },
@@ -207,6 +217,8 @@ struct ByRays<'a> {
     /// How far off a point may be, W/m^2, and what is checked where values are filled in.
     allowed: f64,
     checked: f64,
+    /// So many times as far by root, as they are asked for.
+    slack: &'a [f64],
 }
 
 impl<'a> ByRays<'a> {
@@ -218,12 +230,13 @@ impl<'a> ByRays<'a> {
         let sources =
             Sources { emitted: Some(&rays.lamps), ..Sources::reflected(radiant, &rays.lamps) };
         let checked = CHECKED_BY_RAYS / CHECKED * checked(source);
-        Some(ByRays { source, rays, sources, allowed: rays.allowed, checked })
+        Some(ByRays { source, rays, sources, allowed: rays.allowed, checked, slack: &[] })
     }
 
-    fn scaled(mut self, times: f64) -> ByRays<'a> {
-        self.allowed *= times;
-        self.checked *= times;
+    fn shown(mut self, shown: &'a Shown) -> ByRays<'a> {
+        self.allowed *= shown.brighter;
+        self.checked *= shown.brighter;
+        self.slack = &shown.slack;
         self
     }
 
@@ -237,16 +250,17 @@ impl<'a> ByRays<'a> {
     ) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
         let stage = light.stage();
         let emitters = (&self.source.emitters, self.source.allowed_direct);
-        let sheets = Sheets::new(&light.mesh, asked);
+        let sheets = Sheets::new(&light.mesh, asked, |own| self.slack.get(own).map_or(1.0, |s| *s));
         let (values, counts) = fill(
             &sheets.regions,
             (self.checked, true),
             |_, _, _| (),
-            |walker, (), root, x| {
+            |walker, (), (root, slack), x| {
                 let frame = light.mesh.root_frame(root);
                 let flips = flips(frame.lift(DVec2::ZERO));
                 let place = Place { point: frame.lift(x), normal: frame.n, flips };
-                of(self.rays.gather(&self.sources, emitters, walker, stage, place, self.allowed))
+                let allowed = slack * self.allowed;
+                of(self.rays.gather(&self.sources, emitters, walker, stage, place, allowed))
             },
             |()| AT_ONCE,
             monitor,
@@ -292,7 +306,7 @@ fn from_radiant(
                 None => Beam::new(radiant, stage, &patch, allowed),
             }
         },
-        |walker, beam, root, x| {
+        |walker, beam, (root, _), x| {
             let frame = frame(root);
             let point = frame.lift(x);
             Estimated::exactly(beam.gather(radiant, walker, stage, point, frame.n, allowed))

@@ -39,8 +39,9 @@ pub struct Sheets {
 }
 
 impl Sheets {
-    /// Groups points by the flat surfaces that they lie on.
-    pub fn new(mesh: &Mesh, asked: &[RootPoints]) -> Sheets {
+    /// Groups points by the flat surfaces that they lie on. Where a region holds points of roots with
+    /// different `slack` (by place in `asked`), it has the least.
+    pub fn new(mesh: &Mesh, asked: &[RootPoints], slack: impl Fn(usize) -> f64) -> Sheets {
         let face = |place: usize| &mesh.faces[mesh.roots[asked[place].root as usize].face as usize];
         let off = COINCIDENCE * mesh.magnitude;
         let mut planes: HashMap<u32, Vec<usize>> = HashMap::new();
@@ -65,13 +66,19 @@ impl Sheets {
         }
         let mut sheets = Sheets { regions: vec![], places: vec![] };
         for group in groups {
-            sheets.add(mesh, asked, &group);
+            sheets.add(mesh, asked, &group, &slack);
         }
         sheets
     }
 
     /// Cuts the rectangle around the points of some roots of one surface.
-    fn add(&mut self, mesh: &Mesh, asked: &[RootPoints], group: &[usize]) {
+    fn add(
+        &mut self,
+        mesh: &Mesh,
+        asked: &[RootPoints],
+        group: &[usize],
+        slack: &impl Fn(usize) -> f64,
+    ) {
         let root = asked[group[0]].root;
         let plane = mesh.root_frame(root);
         let mut points = vec![];
@@ -114,7 +121,9 @@ impl Sheets {
                 0 => [low, right, low + side],
                 _ => [low, low + side, top],
             };
-            self.regions.push(Region { root, corners, points });
+            let own = places.iter().map(|&(own, _)| slack(own as usize));
+            let slack = own.fold(f64::INFINITY, f64::min);
+            self.regions.push(Region { root, corners, points, slack });
             self.places.push(places);
         }
     }

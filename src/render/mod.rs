@@ -17,7 +17,9 @@ use crate::error::Result;
 use crate::mesh::Face;
 use crate::monitor::Monitor;
 use crate::reconstruct::fill::RootPoints;
-use crate::reconstruct::irradiance::{IrradianceCounts, brightness, changes, irradiances_against};
+use crate::reconstruct::irradiance::{
+    IrradianceCounts, Shown, brightness, changes, irradiances_shown,
+};
 use crate::reconstruct::{Surface, VertexIrradiance};
 use crate::scene::{self, Camera, Scene};
 use crate::solve::Light;
@@ -30,6 +32,10 @@ const BAND: usize = 1 << 21;
 
 /// So many pixels each way tell how bright a picture is.
 const LOOKED: f64 = 20.0;
+
+/// Irradiance may be more times as far off where surfaces reflect less than is usual in the picture, but
+/// at most so many: it would be seen on dark ones as well.
+const MOST_SLACK: f64 = 3.0;
 
 /// What is drawn, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,8 +85,9 @@ pub fn render(
         let mut counts = IrradianceCounts::default();
         let pixels = painter.gathered(
             options,
-            |asked| {
-                let (values, own) = irradiances_against(light, asked, brighter, monitor)?;
+            |asked, reflectances| {
+                let shown = Shown { brighter, slack: slack(asked, reflectances) };
+                let (values, own) = irradiances_shown(light, asked, &shown, monitor)?;
                 counts += own;
                 Ok(values)
             },
@@ -129,11 +136,21 @@ pub fn error_map(
     let scale = DVec3::select(mean.cmpgt(DVec3::ZERO), estimate.of_change / mean, DVec3::ZERO);
     painter.gathered(
         options,
-        |asked| changes(light, asked, monitor),
+        |asked, _| changes(light, asked, monitor),
         |_| true,
         |patch, change| patch.count * scale * change,
         monitor,
     )
+}
+
+/// How many times as far off irradiance may be on roots that reflect so much: what errors of it do to the
+/// picture is to be the same everywhere. Relative to the root mean square over all points.
+fn slack(asked: &[RootPoints], reflectances: &[f64]) -> Vec<f64> {
+    let count = |own: &RootPoints| own.points.len() as f64;
+    let all: f64 = asked.iter().map(count).sum();
+    let squares = asked.iter().zip(reflectances).map(|(own, rho)| count(own) * rho * rho);
+    let usual = (squares.sum::<f64>() / all).sqrt();
+    reflectances.iter().map(|rho| (usual / rho).clamp(1.0, MOST_SLACK)).collect()
 }
 
 struct Painter<'a> {
@@ -170,11 +187,12 @@ impl<'a> Painter<'a> {
     }
 
     /// Pixels as sums over their patches of what `compose` makes of a patch and of the value that
-    /// `gather` finds in the middle of it (where `wants` it: zero elsewhere).
+    /// `gather` (points by root, largest reflectance in the patches of each) finds in the middle of it
+    /// (where `wants` it: zero elsewhere).
     fn gathered(
         &self,
         options: &RenderOptions,
-        mut gather: impl FnMut(&[RootPoints]) -> Result<Vec<Vec<DVec3>>>,
+        mut gather: impl FnMut(&[RootPoints], &[f64]) -> Result<Vec<Vec<DVec3>>>,
         wants: impl Fn(&Patch) -> bool,
         compose: impl Fn(&Patch, DVec3) -> DVec3,
         monitor: &Monitor,
@@ -186,6 +204,7 @@ impl<'a> Painter<'a> {
             let rows = first..(first + rows_at_once).min(options.height);
             let (patches, ends) = self.band(rows, options.width, monitor)?;
             let mut asked: Vec<RootPoints> = vec![];
+            let mut reflectances: Vec<f64> = vec![];
             let mut group = vec![None; self.light.mesh.roots.len()];
             // Where the value of each patch will be.
             let places: Vec<Option<(usize, usize)>> = patches
@@ -194,15 +213,18 @@ impl<'a> Painter<'a> {
                     wants(patch).then(|| {
                         let own = *group[patch.root as usize].get_or_insert_with(|| {
                             asked.push(RootPoints { root: patch.root, points: vec![] });
+                            reflectances.push(0.0);
                             asked.len() - 1
                         });
+                        let reflectance = patch.reflectance.max_element() / patch.count;
+                        reflectances[own] = reflectances[own].max(reflectance);
                         // A root is convex: the mean of points on it lies on it.
                         asked[own].points.push(patch.place / patch.count);
                         (own, asked[own].points.len() - 1)
                     })
                 })
                 .collect();
-            let values = gather(&asked)?;
+            let values = gather(&asked, &reflectances)?;
             let mut begin = 0;
             for end in ends {
                 let sum: DVec3 = (begin..end)
