@@ -15,6 +15,7 @@ use lumel::operator::Walker;
 use lumel::scene::{Material, Object, ReadOptions, Scene, read};
 use lumel::solve::{Light, WithinOptions, light_within};
 use rayon::prelude::*;
+use serde_json::Value;
 
 fn shipped(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
@@ -174,6 +175,75 @@ fn smooth_texels_have_the_irradiance_at_their_centres() {
         }
     }
     assert!(count > 150, "{count}");
+}
+
+/// Points that Mitsuba traced (`tools/mitsuba/references.py`): position, normal, irradiance and the
+/// standard error of that.
+fn traced(name: &str) -> Vec<[DVec3; 4]> {
+    let path = format!("{}/tests/data/mitsuba_{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let data: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let vector = |v: &Value| DVec3::from_array([0, 1, 2].map(|k| v[k].as_f64().unwrap()));
+    let entries = data["points"]["entries"].as_array().unwrap();
+    let of =
+        |e: &Value| ["position", "normal", "irradiance", "standard_error"].map(|k| vector(&e[k]));
+    entries.iter().map(of).collect()
+}
+
+#[test]
+fn texels_agree_with_a_path_tracer() {
+    let tolerance = 0.003;
+    for name in ["cornell", "room"] {
+        let baked = baked(shipped(&format!("{name}.gltf")), tolerance, &of_size(512));
+        let (size, extent) = (f64::from(baked.map.width), baked.scene.extent());
+        let (mut squares, mut expected, mut smooth) = (0.0, 0.0, 0);
+        let points = traced(name);
+        for [position, normal, theirs, error] in &points {
+            let holds = |&i: &usize| {
+                let t = baked.scene.triangles[i].vertices;
+                let n = (t[1] - t[0]).cross(t[2] - t[0]);
+                let w = |p: DVec3, q: DVec3| (q - p).cross(*position - p).dot(n);
+                let inside = w(t[0], t[1]).min(w(t[1], t[2])).min(w(t[2], t[0])) >= 0.0;
+                let off = (*position - t[0]).dot(n.normalize()).abs();
+                inside && off < 1e-6 * extent && normal.dot(n.normalize()) > 0.999
+            };
+            let triangle = (0..baked.scene.triangles.len()).find(holds).unwrap();
+            // Two texels.
+            let t = baked.scene.triangles[triangle].vertices;
+            let longest = (t[1] - t[0]).length().max((t[2] - t[0]).length());
+            let uv = baked.atlas.uv[triangle];
+            let across = size * (uv[1] - uv[0]).length().max((uv[2] - uv[0]).length());
+            let step = 2.0 * longest / across;
+            let along = (t[1] - t[0]).normalize();
+            let sides = [along, along.cross(*normal)];
+            let ours = baked.shown(triangle, *position);
+            // Filtering rounds off what light bends by.
+            let bends = sides
+                .map(|side| {
+                    let at = |by: f64| baked.shown(triangle, *position + by * step * side);
+                    (at(1.0) + at(-1.0) - 2.0 * ours).abs().max_element()
+                })
+                .into_iter()
+                .fold(0.0, f64::max);
+            if bends > tolerance * baked.mean {
+                continue;
+            }
+            smooth += 1;
+            let off = (ours - *theirs).abs();
+            let allowed = 4.0 * error.max_element() + tolerance * baked.mean + bends;
+            assert!(off.max_element() < allowed, "{name} {position}: {ours} {theirs} {error}");
+            squares += off.max_element().powi(2);
+            expected += error.max_element().powi(2);
+        }
+        assert!(2 * smooth > points.len(), "{name}: {smooth} of {}", points.len());
+        let rms = |sum: f64| (sum / f64::from(smooth as u32)).sqrt() / baked.mean;
+        println!(
+            "{name}: {smooth} of {}, {:.2e} {:.2e}",
+            points.len(),
+            rms(squares),
+            rms(expected)
+        );
+        assert!(rms(squares) < (2.0 * rms(expected)).hypot(0.3 * tolerance), "{name}");
+    }
 }
 
 #[test]
