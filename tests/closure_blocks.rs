@@ -1,6 +1,8 @@
 //! Closure of rooms full of things: what a point of them sees adds up to one, whatever touches what.
 
 mod common;
+#[path = "common/packed.rs"]
+mod packed;
 #[path = "common/random.rs"]
 #[allow(dead_code)]
 mod random;
@@ -14,6 +16,7 @@ use lumel::geometry::Frame;
 use lumel::mesh::{Basis, Refinement};
 use lumel::operator::Walker;
 use lumel::scene::Scene;
+use packed::packed;
 use random::Random;
 
 /// How a scene is placed in space: scale, shift in sizes, and how near to one the sums must be.
@@ -82,27 +85,6 @@ fn quads_scene(quads: impl IntoIterator<Item = [DVec3; 4]>) -> Scene {
 }
 
 type Block = (DVec3, DVec3);
-
-/// Blocks on the grid {0..n}^3 that do not overlap but touch each other and the walls.
-fn packed(r: &mut Random, n: usize, wanted: usize) -> Vec<Block> {
-    let mut blocks: Vec<Block> = vec![];
-    for _ in 0..20 * wanted {
-        if blocks.len() == wanted {
-            break;
-        }
-        let mut sides = || {
-            let low = r.below(n);
-            (low as f64, (low + 1 + r.below((n - low).min(2))) as f64)
-        };
-        let (x, y, z) = (sides(), sides(), sides());
-        let (min, max) = (DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1));
-        let apart = |b: &Block| b.1.cmple(min).any() || max.cmple(b.0).any();
-        if blocks.iter().all(apart) {
-            blocks.push((min, max));
-        }
-    }
-    blocks
-}
 
 #[test]
 fn rooms_of_touching_blocks_are_closed() {

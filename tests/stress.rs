@@ -5,6 +5,8 @@ mod checks;
 mod common;
 #[path = "../tools/stress/light.rs"]
 mod light;
+#[path = "common/packed.rs"]
+mod packed;
 #[path = "common/random.rs"]
 #[allow(dead_code)]
 mod random;

@@ -144,7 +144,7 @@ fn render(settings: &RenderSettings) -> Result<()> {
     }
     progress.clear();
     session.finish()?;
-    let filled = light.apart().map_or(0.0, |_| gathered.error());
+    let filled = gathered.error();
     outcome::met(&light, filled, hurried)
 }
 

@@ -128,8 +128,8 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Casts rays from the spots of each cell, and looks at points of `lamps`. Spots of patches that have none in the
-    /// open, but are seen, are moved to where they are seen.
+    /// Casts rays from the spots of each cell, and looks at points of `lamps`. Spots of patches that
+    /// have none in the open, but are seen, are moved to where they are seen.
     ///
     /// # Errors
     ///

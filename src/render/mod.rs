@@ -81,7 +81,8 @@ pub fn render(
     let mut painter = Painter::new(scene, light, camera, options, &surface);
     if options.gather || light.apart().is_some() {
         let mean = light.apart().map_or(DVec3::ZERO, |source| source.estimate.mean);
-        let brighter = painter.brightness(options, monitor)?;
+        let by_rays = light.apart().is_some_and(|source| source.rays.is_some());
+        let brighter = if by_rays { painter.brightness(options, monitor)? } else { 1.0 };
         let mut counts = IrradianceCounts::default();
         let pixels = painter.gathered(
             options,

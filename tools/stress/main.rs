@@ -8,6 +8,8 @@ mod checks;
 #[path = "../../tests/common/mod.rs"]
 mod common;
 mod light;
+#[path = "../../tests/common/packed.rs"]
+mod packed;
 #[path = "../../tests/common/random.rs"]
 #[allow(dead_code)]
 mod random;

@@ -5,6 +5,7 @@ use lumel::mesh::Basis;
 use lumel::scene::{Material, Scene, Triangle, resolve_overlaps};
 
 use super::common::{box_quads, material, rotated, scene, triangle};
+use super::packed::packed;
 use super::random::Random;
 
 type Quad = [DVec3; 4];
@@ -49,7 +50,7 @@ const fn family(
 /// All families.
 pub const FAMILIES: [Family; 10] = [
     family("corners on a grid", grid, Basis::Linear, [1e-13, 1e-13, 1e-7]),
-    family("blocks that touch on a grid", packed, Basis::Linear, [1e-13, 1e-13, 1e-7]),
+    family("blocks that touch on a grid", touching, Basis::Linear, [1e-13, 1e-13, 1e-7]),
     family("bottomless blocks side by side", bottomless, Basis::Linear, [1e-13, 1e-13, 1e-7]),
     family("T-junctions", junctions, Basis::Linear, [1e-13, 1e-13, 1e-7]),
     family("faces that cross", crossing, Basis::Linear, [1e-11, 1e-11, 1e-5]),
@@ -103,26 +104,13 @@ fn grid(seed: u64) -> Case {
 }
 
 /// Blocks on a grid that touch each other and the walls.
-fn packed(seed: u64) -> Case {
+fn touching(seed: u64) -> Case {
     let mut r = Random::new(seed);
     let n = 2 + r.below(3);
     let mut quads = walls(DVec3::splat(n as f64));
-    let mut blocks: Vec<(DVec3, DVec3)> = vec![];
     let wanted = 1 + r.below(6);
-    for _ in 0..20 * wanted {
-        if blocks.len() == wanted {
-            break;
-        }
-        let mut sides = || {
-            let low = r.below(n);
-            (low as f64, (low + 1 + r.below((n - low).min(2))) as f64)
-        };
-        let (x, y, z) = (sides(), sides(), sides());
-        let (min, max) = (DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1));
-        if blocks.iter().all(|b| b.1.cmple(min).any() || max.cmple(b.0).any()) {
-            blocks.push((min, max));
-            quads.extend(box_quads(min, max, true).into_iter().map(|q| (q, 0)));
-        }
+    for (min, max) in packed(&mut r, n, wanted) {
+        quads.extend(box_quads(min, max, true).into_iter().map(|q| (q, 0)));
     }
     case(&quads, true)
 }
