@@ -62,7 +62,9 @@ pub struct Gathered {
 }
 
 impl Gathered {
-    /// Root mean square error of the irradiance by filling in and rays, relative to [`Gathered::against`].
+    /// Root mean square error of the irradiance by filling in and rays, relative to
+    /// [`Gathered::against`]; by rays, where surfaces reflect less than is usual, counted for as much
+    /// less, a third at least.
     pub fn error(&self) -> f64 {
         self.counts.error(self.against)
     }
