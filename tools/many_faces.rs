@@ -15,7 +15,7 @@ use lumel::operator::Walker;
 use lumel::operator::bundles::RayScene;
 use lumel::operator::hemisphere::{direction, flips, in_square};
 use lumel::operator::lamps::Place;
-use lumel::operator::ray_gather::{RayCounts, Sources};
+use lumel::operator::ray_gather::{Enough, RayCounts, Sources};
 use lumel::output::machine;
 use lumel::reconstruct::fill::RootPoints;
 use lumel::reconstruct::irradiance::irradiances;
@@ -125,7 +125,9 @@ fn reference(light: &Light, asked: &[RootPoints]) -> Vec<DVec3> {
                 let sources = Sources::reflected(radiant, &rays.lamps);
                 let counts = RayCounts { least: RAYS, most: RAYS };
                 let scene = (&rays.scene, &light.mesh);
-                sources.gather(walker, scene, Place::new(point, n), 0.0, counts).irradiance
+                sources
+                    .gather(walker, scene, Place::new(point, n), Enough::of(0.0), counts)
+                    .irradiance
             }
             (reflected, _) => source.gather_reflected(reflected, walker, stage, point, n),
         };

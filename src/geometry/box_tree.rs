@@ -26,6 +26,17 @@ pub struct BoxTree {
 impl BoxTree {
     /// Builds the tree of `boxes`; items are known by their index.
     pub fn build(boxes: &[Bounds]) -> BoxTree {
+        BoxTree::built_as(boxes, BvhBuildParams::medium_build())
+    }
+
+    /// The same for very many queries: takes longer to build, and is a twentieth faster.
+    pub fn build_well(boxes: &[Bounds]) -> BoxTree {
+        // Without cut boxes: items are in one leaf each.
+        let how = BvhBuildParams { pre_split: false, ..BvhBuildParams::slow_build() };
+        BoxTree::built_as(boxes, how)
+    }
+
+    fn built_as(boxes: &[Bounds], how: BvhBuildParams) -> BoxTree {
         let all = boxes.iter().fold(Bounds::EMPTY, |a, &b| a.union(b));
         let (centre, scale) = match 0.5 * all.extent() {
             half if half > 0.0 => (all.centre(), half),
@@ -46,7 +57,7 @@ impl BoxTree {
         } else if nested::merges_slowly(&proposed) {
             nested::halved(&proposed)
         } else {
-            build_bvh2(&proposed, BvhBuildParams::medium_build(), &mut Duration::default())
+            build_bvh2(&proposed, how, &mut Duration::default())
         };
         BoxTree { tree, centre, scale }
     }

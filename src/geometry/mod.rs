@@ -10,6 +10,7 @@ mod nested;
 pub mod polygon;
 pub mod ray;
 pub mod ray_tree;
+pub mod triangle_packs;
 
 pub use bounds::Bounds;
 pub use box_tree::BoxTree;

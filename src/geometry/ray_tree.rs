@@ -1,6 +1,7 @@
 //! The nearest triangle along a ray, for very many rays.
 //!
-//! Boxes are met in f32, padded so that none is missed; triangles decide in f64
+//! Boxes are met in f32, padded so that none is missed, and so are triangles, four at once
+//! ([`super::triangle_packs`]); of those that may be met each decides in f64
 //! ([`super::ray::intersect`]), so that a closed surface has no leaks.
 
 use std::ops::Range;
@@ -9,6 +10,7 @@ use glam::{DVec3, Vec4};
 use obvhs::bvh2::node::Bvh2Node;
 
 use super::box_tree::BoxTree;
+use super::triangle_packs::{PACK, Pack, Sheared};
 use super::{Bounds, ray};
 
 /// Padding of boxes in a scene scaled to the cube from -1 to 1: roundings of a ray's origin in f32,
@@ -28,9 +30,10 @@ const WIDTH: usize = 4;
 pub struct RayTree {
     /// The root first; none where there are no triangles.
     nodes: Vec<Node>,
-    /// First triangle of each leaf and the end of its triangles.
-    leaves: Vec<(u32, u32)>,
+    leaves: Vec<Leaf>,
     triangles: Vec<[DVec3; 3]>,
+    /// Those of each leaf in f32.
+    packs: Vec<Pack>,
     /// Numbers that the triangles came with, and whether front and back are preferred.
     numbers: Vec<u32>,
     preferred: Vec<[bool; 2]>,
@@ -51,6 +54,16 @@ struct Node {
 
 const LEAF: u32 = 1 << 31;
 
+/// Triangles and packs of a leaf.
+#[derive(Clone, Copy)]
+struct Leaf {
+    /// Its first triangle.
+    first: u32,
+    /// Its first pack, and how many it has.
+    pack: u32,
+    packs: u32,
+}
+
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
@@ -67,11 +80,12 @@ impl RayTree {
     /// back) is met.
     pub fn build(triangles: &[[DVec3; 3]], preferred: impl Fn(usize, bool) -> bool) -> RayTree {
         let boxes: Vec<Bounds> = triangles.iter().map(Bounds::of).collect();
-        let tree = BoxTree::build(&boxes);
+        let tree = BoxTree::build_well(&boxes);
         let mut own = RayTree {
             nodes: vec![],
             leaves: vec![],
             triangles: vec![],
+            packs: vec![],
             numbers: vec![],
             preferred: vec![],
             centre: tree.centre,
@@ -122,7 +136,12 @@ impl RayTree {
             self.preferred.push([false, true].map(|back| preferred(number as usize, back)));
             self.triangles.push(triangles[number as usize]);
         }
-        self.leaves.push((first, self.numbers.len() as u32));
+        let (centre, scale) = (self.centre, self.scale);
+        let own = self.triangles[first as usize..].iter();
+        let scaled: Vec<[DVec3; 3]> = own.map(|t| t.map(|x| (x - centre) / scale)).collect();
+        let pack = self.packs.len() as u32;
+        self.packs.extend(scaled.chunks(PACK).map(Pack::new));
+        self.leaves.push(Leaf { first, pack, packs: self.packs.len() as u32 - pack });
     }
 
     /// The nearest triangle beyond the distance `beyond`, both in units of `direction`.
@@ -138,29 +157,27 @@ impl RayTree {
     ) -> Option<RayHit> {
         let mut best: Option<(RayHit, bool)> = None;
         let line = Line::new(self, origin, direction);
-        self.visit(&line, f32::INFINITY, stack, |leaf, mut end| {
-            for i in leaf {
-                let triangle = &self.triangles[i];
-                let Some(hit) = ray::intersect(origin, direction, triangle) else { continue };
-                if hit.t <= beyond {
-                    continue;
-                }
-                let [a, b, c] = *triangle;
-                let back = direction.dot((b - a).cross(c - a)) > 0.0;
-                let (number, preferred) = (self.numbers[i], self.preferred[i][usize::from(back)]);
-                let wins = best.is_none_or(|(other, liked)| {
-                    if (hit.t - other.t).abs() <= SAME * other.t {
-                        (!preferred, number) < (!liked, other.triangle)
-                    } else {
-                        hit.t < other.t
-                    }
-                });
-                if wins {
-                    best = Some((RayHit { t: hit.t, triangle: number, back }, preferred));
-                    end = (hit.t as f32).next_up();
-                }
+        self.visit(&line, f32::INFINITY, stack, |i, end| {
+            let triangle = &self.triangles[i];
+            let Some(hit) = ray::intersect(origin, direction, triangle) else { return Some(end) };
+            if hit.t <= beyond {
+                return Some(end);
             }
-            Some(end)
+            let [a, b, c] = *triangle;
+            let back = direction.dot((b - a).cross(c - a)) > 0.0;
+            let (number, preferred) = (self.numbers[i], self.preferred[i][usize::from(back)]);
+            let wins = best.is_none_or(|(other, liked)| {
+                if (hit.t - other.t).abs() <= SAME * other.t {
+                    (!preferred, number) < (!liked, other.triangle)
+                } else {
+                    hit.t < other.t
+                }
+            });
+            if !wins {
+                return Some(end);
+            }
+            best = Some((RayHit { t: hit.t, triangle: number, back }, preferred));
+            Some((hit.t as f32).next_up())
         });
         best.map(|(hit, _)| hit)
     }
@@ -176,55 +193,77 @@ impl RayTree {
     ) -> bool {
         let line = Line::new(self, origin, direction);
         let mut blocked = false;
-        self.visit(&line, (range.end as f32).next_up(), stack, |mut leaf, end| {
-            blocked = leaf.any(|i| {
-                let hit = ray::intersect(origin, direction, &self.triangles[i]);
-                hit.is_some_and(|hit| hit.t > range.start && hit.t < range.end)
-            });
+        self.visit(&line, (range.end as f32).next_up(), stack, |i, end| {
+            let hit = ray::intersect(origin, direction, &self.triangles[i]);
+            blocked = hit.is_some_and(|hit| hit.t > range.start && hit.t < range.end);
             (!blocked).then_some(end)
         });
         blocked
     }
 
-    /// Calls `leaf` with the triangles of each leaf that a line meets before `end`, nearer ones
+    /// Calls `may_meet` with the triangles that a line may meet before `end`, nearer ones
     /// mostly first; it returns where the line ends from then on, or nothing to stop.
     fn visit(
         &self,
         line: &Line,
         mut end: f32,
         stack: &mut Vec<(u32, f32)>,
-        mut leaf: impl FnMut(Range<usize>, f32) -> Option<f32>,
+        mut may_meet: impl FnMut(usize, f32) -> Option<f32>,
     ) {
         stack.clear();
-        if !self.nodes.is_empty() {
-            stack.push((0, 0.0));
+        if self.nodes.is_empty() {
+            return;
         }
-        while let Some((index, near)) = stack.pop() {
-            if near > end * ROOM {
-                continue;
+        let mut index = 0;
+        loop {
+            if index < LEAF {
+                let node = &self.nodes[index as usize];
+                let (near, mut met) = line.enter(node, end);
+                if met != 0 {
+                    // Goes on with the nearest; the others wait, nearer ones on top.
+                    let mut nearest = met.trailing_zeros() as usize;
+                    met &= met - 1;
+                    let begin = stack.len();
+                    while met != 0 {
+                        let mut k = met.trailing_zeros() as usize;
+                        met &= met - 1;
+                        if near[k] < near[nearest] {
+                            std::mem::swap(&mut k, &mut nearest);
+                        }
+                        let mut place = stack.len();
+                        stack.push((node.children[k], near[k]));
+                        while place > begin && stack[place - 1].1 < near[k] {
+                            stack.swap(place, place - 1);
+                            place -= 1;
+                        }
+                    }
+                    index = node.children[nearest];
+                    continue;
+                }
+            } else {
+                let leaf = self.leaves[(index - LEAF) as usize];
+                let packs = &self.packs[leaf.pack as usize..][..leaf.packs as usize];
+                let mut begin = leaf.first as usize;
+                for pack in packs {
+                    let mut met = line.sheared.may_meet(pack, end * ROOM);
+                    while met != 0 {
+                        let i = begin + met.trailing_zeros() as usize;
+                        met &= met - 1;
+                        match may_meet(i, end) {
+                            Some(nearer) => end = nearer,
+                            None => return,
+                        }
+                    }
+                    begin += PACK;
+                }
             }
-            if index >= LEAF {
-                let (first, last) = self.leaves[(index - LEAF) as usize];
-                match leaf(first as usize..last as usize, end) {
-                    Some(nearer) => end = nearer,
+            index = loop {
+                match stack.pop() {
                     None => return,
+                    Some((_, near)) if near > end * ROOM => continue,
+                    Some((waiting, _)) => break waiting,
                 }
-                continue;
-            }
-            let node = &self.nodes[index as usize];
-            let (near, mut met) = line.enter(node, end);
-            // The nearest on top.
-            let begin = stack.len();
-            while met != 0 {
-                let k = met.trailing_zeros() as usize;
-                met &= met - 1;
-                let mut place = stack.len();
-                stack.push((node.children[k], near[k]));
-                while place > begin && stack[place - 1].1 < near[k] {
-                    stack.swap(place, place - 1);
-                    place -= 1;
-                }
-            }
+            };
         }
     }
 }
@@ -235,20 +274,24 @@ struct Line {
     inverse: [Vec4; 3],
     /// Which side of boxes is met first, by axis.
     first: [usize; 3],
+    sheared: Sheared,
 }
 
 impl Line {
     fn new(tree: &RayTree, origin: DVec3, direction: DVec3) -> Line {
         // Nothing is divided by zero: a ray along a side of a box meets it.
-        let inverse = (direction / tree.scale)
+        let direction = direction / tree.scale;
+        let origin = (origin - tree.centre) / tree.scale;
+        let inverse = direction
             .as_vec3()
             .to_array()
             .map(|d| if d.abs() < 1e-30 { 1e30f32.copysign(d) } else { d.recip() });
-        let start = ((origin - tree.centre) / tree.scale).as_vec3().to_array();
+        let start = origin.as_vec3().to_array();
         Line {
             start: start.map(Vec4::splat),
             inverse: inverse.map(Vec4::splat),
             first: inverse.map(|d| usize::from(d < 0.0)),
+            sheared: Sheared::new(origin, direction),
         }
     }
 

@@ -102,6 +102,11 @@ impl std::ops::AddAssign for FillCounts {
 /// the shipped scenes.
 const OF_CHECK: f64 = 0.3;
 
+/// Of the square of what a check was off by, what filling in made: not what the check itself is off by.
+fn of_filling(off: DVec3, check: &Estimated) -> DVec3 {
+    (off * off - check.spread * check.spread).max(DVec3::ZERO)
+}
+
 /// Values at points, region by region in the order given: gathered, or filled in where the check finds
 /// no difference above `allowed` in any channel. With `allowed` 0 every point is gathered. Where
 /// `small`, regions of few points are filled in too, with a single check, and regions may lie beside the
@@ -297,13 +302,13 @@ impl<O, G, M> Filler<O, G, M> {
             if chosen.contains(&check) || checks[..k].contains(&check) {
                 continue;
             }
-            let found = self.value(shared, points[check].x)?.irradiance;
-            let off = (linear(&weights[check]) - found).abs();
+            let found = self.value(shared, points[check].x)?;
+            let off = (linear(&weights[check]) - found.irradiance).abs();
             if off.max_element() > self.allowed {
                 return Ok(false);
             }
             largest = largest.max(off.max_element());
-            squares = squares.max(off * off);
+            squares = squares.max(of_filling(off, &found));
         }
         self.done.largest = self.done.largest.max(largest);
         self.done.squares += points.len() as f64 * (OF_CHECK * OF_CHECK * squares + spread);
@@ -382,7 +387,7 @@ impl<O, G, M> Filler<O, G, M> {
             *value = found.irradiance;
             let off = (quadratic(&six, w) - *value).abs();
             worst = worst.max(off.max_element());
-            squares += off * off / NINE.len() as f64;
+            squares += of_filling(off, &found) / NINE.len() as f64;
             spread += found.spread * found.spread / NINE.len() as f64;
         }
         let four = children(&six, &nine);

@@ -18,7 +18,7 @@ use crate::mesh::Face;
 use crate::monitor::Monitor;
 use crate::reconstruct::fill::RootPoints;
 use crate::reconstruct::irradiance::{
-    IrradianceCounts, Shown, brightness, changes, irradiances_shown,
+    IrradianceCounts, Look, Shown, changes, irradiances_shown, look,
 };
 use crate::reconstruct::{Surface, VertexIrradiance};
 use crate::scene::{self, Camera, Scene};
@@ -30,7 +30,7 @@ pub use camera_rays::{CameraRays, Ray};
 /// memory.
 const BAND: usize = 1 << 21;
 
-/// So many pixels each way tell how bright a picture is.
+/// So many pixels each way tell how bright a picture is, and how many rays it takes.
 const LOOKED: f64 = 20.0;
 
 /// Irradiance may be more times as far off where surfaces reflect less than is usual in the picture, but
@@ -83,13 +83,12 @@ pub fn render(
     let mut painter = Painter::new(scene, light, camera, options, &surface);
     if options.gather || light.apart().is_some() {
         let mean = light.apart().map_or(DVec3::ZERO, |source| source.estimate.mean);
-        let by_rays = light.apart().is_some_and(|source| source.rays.is_some());
-        let brighter = if by_rays { painter.brightness(options, monitor)? } else { 1.0 };
+        let look = painter.look(options, monitor)?;
         let mut counts = IrradianceCounts::default();
         let pixels = painter.gathered(
             options,
             |asked, reflectances| {
-                let shown = Shown { brighter, slack: slack(asked, reflectances) };
+                let shown = Shown { look, slack: slack(asked, reflectances) };
                 let (values, own) = irradiances_shown(light, asked, &shown, monitor)?;
                 counts += own;
                 Ok(values)
@@ -100,7 +99,7 @@ pub fn render(
             },
             monitor,
         )?;
-        return Ok((pixels, Gathered { counts, against: brighter * mean }));
+        return Ok((pixels, Gathered { counts, against: look.brighter * mean }));
     }
     painter.vertices = Some(VertexIrradiance::new(&light.mesh, &light.solution.irradiance));
     let stage = monitor.stage("render", u64::from(options.height));
@@ -243,20 +242,24 @@ impl<'a> Painter<'a> {
         Ok(pixels)
     }
 
-    /// How many times as bright as the whole surface what the picture shows is, by some pixels.
-    fn brightness(&self, options: &RenderOptions, monitor: &Monitor) -> Result<f64> {
-        let (mut asked, mut weights) = (vec![], vec![]);
+    /// What some pixels tell of the picture, where light is gathered by rays.
+    fn look(&self, options: &RenderOptions, monitor: &Monitor) -> Result<Look> {
+        if self.light.apart().is_none_or(|source| source.rays.is_none()) {
+            return Ok(Look::default());
+        }
+        let (mut asked, mut weights, mut reflectances) = (vec![], vec![], vec![]);
         let middle = |k: u32, size: u32| ((f64::from(k) + 0.5) * f64::from(size) / LOOKED) as u32;
         for k in 0..(LOOKED * LOOKED) as u32 {
             let (i, j) = (k % LOOKED as u32, k / LOOKED as u32);
             let (x, y) = (middle(i, options.width), middle(j, options.height));
-            for patch in self.patches(x, y) {
+            for patch in self.patches(x, y).iter().filter(|p| p.reflectance != DVec3::ZERO) {
                 let points = vec![patch.place / patch.count];
                 asked.push(RootPoints { root: patch.root, points });
                 weights.push(patch.count);
+                reflectances.push(patch.reflectance.max_element() / patch.count);
             }
         }
-        brightness(self.light, &asked, &weights, monitor)
+        look(self.light, &asked, &weights, &slack(&asked, &reflectances), monitor)
     }
 
     /// The patches of the pixels of some rows, and where those of each pixel end.

@@ -14,7 +14,7 @@ use crate::operator::clustered::ClusteredSource;
 use crate::operator::fast::FitSource;
 use crate::operator::gather::Radiant;
 use crate::operator::lamps::{Lamps, Place};
-use crate::operator::ray_gather::{Estimated, RayCounts, RayRadiant, Sources};
+use crate::operator::ray_gather::{Enough, Estimated, RayCounts, RayRadiant, Sources};
 use crate::operator::walk::{Stage, Walker, gather};
 use crate::operator::{Operator, OperatorKind};
 use crate::scene::Scene;
@@ -212,9 +212,13 @@ pub(super) fn row_sums(operator: &Operator, mesh: &Mesh, receives: &[bool]) -> (
 /// A face that emits costs as much exactly as about so many rays and points of what emits.
 const EXACT: u32 = 512;
 
+/// Where rays and points of what emits are looked at together, so many times fewer of each come first: many
+/// points need no more.
+const OF_FIRST: u32 = 4;
+
 impl RaySource {
-    /// Irradiance from some `sources` at a point with a unit normal, with a spread of at most
-    /// `allowed` (W/m^2). Emitted light is gathered exactly (from `emitters`, whose cells may make
+    /// Irradiance from some `sources` at a point with a unit normal, with a spread that is
+    /// `enough`. Emitted light is gathered exactly (from `emitters`, whose cells may make
     /// the error given with them) where that costs no more than the rays that it would take.
     pub fn gather(
         &self,
@@ -223,19 +227,19 @@ impl RaySource {
         walker: &mut Walker,
         stage: Stage,
         place: Place,
-        allowed: f64,
+        enough: Enough,
     ) -> Estimated {
         let scene = (&self.scene, stage.mesh);
         if sources.emitted.is_none() {
-            return sources.gather(walker, scene, place, allowed, self.counts);
+            return sources.gather(walker, scene, place, enough, self.counts);
         }
         // As many points of what emits are looked at as rays are cast.
-        let least = (self.counts.least / 2).max(8);
+        let least = (self.counts.least / OF_FIRST).max(8);
         let most = EXACT.saturating_mul(self.lamps.len() as u32).next_power_of_two();
         if least <= most && self.lamps.are_even() {
             let counts = RayCounts { least, most: most.min(self.counts.most) };
-            let found = sources.gather(walker, scene, place, allowed, counts);
-            if found.is_within(allowed) {
+            let found = sources.gather(walker, scene, place, enough, counts);
+            if found.is_within(enough, counts.most) {
                 return found;
             }
         }
@@ -244,7 +248,7 @@ impl RaySource {
             return Estimated::exactly(direct);
         }
         let reflected = Sources { emitted: None, ..*sources };
-        let more = reflected.gather(walker, scene, place, allowed, self.counts);
+        let more = reflected.gather(walker, scene, place, enough, self.counts);
         Estimated { irradiance: direct + more.irradiance, ..more }
     }
 }
@@ -266,7 +270,8 @@ impl ApartSource {
             (Reflected::Rays(radiant), Some(rays)) => {
                 let sources = Sources::reflected(radiant, &rays.lamps);
                 let (scene, place) = ((&rays.scene, stage.mesh), Place::new(point, normal));
-                sources.gather(walker, scene, place, self.allowed, rays.counts).irradiance
+                let enough = Enough::of(self.allowed);
+                sources.gather(walker, scene, place, enough, rays.counts).irradiance
             }
             (Reflected::Rays(_), None) => DVec3::ZERO,
         }

@@ -22,7 +22,7 @@ use crate::monitor::Monitor;
 use crate::operator::bundles::{RayScene, Rows};
 use crate::operator::lamps::{Lamps, Place, Samples};
 use crate::operator::patches::{PatchSizes, Patches};
-use crate::operator::ray_gather::{Estimated, RayCounts, RayRadiant, Sources};
+use crate::operator::ray_gather::{Enough, Estimated, RayCounts, RayRadiant, Sources};
 use crate::operator::walk::{Stage, Walker};
 use crate::scene::Scene;
 use crate::visibility::Occluders;
@@ -144,8 +144,8 @@ pub fn light_of_many(
         .map_init(Walker::default, |walker, s| {
             monitor.check()?;
             let (how, place) = ((&emitters, share::EMITTER * unit), Place::new(s.point, s.normal));
-            let allowed = share::GATHER * unit;
-            Ok(rays.gather(&sources, how, walker, stage, place, allowed).irradiance)
+            let enough = Enough::of(share::GATHER * unit);
+            Ok(rays.gather(&sources, how, walker, stage, place, enough).irradiance)
         })
         .collect::<Result<_>>()?;
     let ladder = Ladder {
@@ -279,7 +279,7 @@ impl Ladder<'_> {
             Some(before) => before.estimate.mean,
             None => self.emitted,
         };
-        let allowed = share::GATHER * tolerance * mean.max_element();
+        let enough = Enough::of(share::GATHER * tolerance * mean.max_element());
         let mesh = self.stage.mesh;
         let sources = Sources {
             before: before.map(|b| &b.step.radiant),
@@ -292,7 +292,7 @@ impl Ladder<'_> {
                 self.monitor.check()?;
                 let place = Place::new(s.point, s.normal);
                 let scene = (&self.rays.scene, mesh);
-                Ok(sources.gather(walker, scene, place, allowed, self.rays.counts))
+                Ok(sources.gather(walker, scene, place, enough, self.rays.counts))
             })
             .collect::<Result<_>>()?;
         let at_samples: Vec<DVec3> = found.iter().map(|e| e.irradiance).collect();
