@@ -120,12 +120,16 @@ fn no_output_is_an_input_under_any_name() {
     }
 }
 
-/// Runs a command to its time limit, which it may overrun by about `seconds` on a machine that does
-/// nothing else, and returns its message.
-fn hurried(room: &std::path::Path, words: &str, seconds: u64) -> String {
+/// Runs a command to a time limit, which it may overrun by about `seconds` on a machine that does
+/// nothing else, and returns its message. On a busy machine the limit may be over before there is
+/// anything to write: then it is doubled.
+fn hurried(room: &std::path::Path, words: &str, limit: f64, seconds: u64) -> String {
     let begin = Instant::now();
-    let output = lumel(room, words);
+    let output = lumel(room, &format!("{words} --time-limit {limit}"));
     let took = begin.elapsed();
+    if limit < 10.0 && stderr(&output).contains("before there was a result") {
+        return hurried(room, words, 2.0 * limit, 2 * seconds);
+    }
     assert_eq!(code(&output), 4, "{words}: {}", stderr(&output));
     assert!(took < Duration::from_secs(4 * seconds), "{words}: {took:?}");
     let message = stderr(&output);
@@ -137,8 +141,8 @@ fn hurried(room: &std::path::Path, words: &str, seconds: u64) -> String {
 fn output_that_takes_too_long_is_coarse_and_said_to_be() {
     let room = tempfile::tempdir().unwrap();
     let words = "render scenes/cornell.gltf -o v.exr --tolerance 3% --size 3000x2000 --samples 16 \
-                 --error-map e.exr --time-limit 1.5 --quiet";
-    let message = hurried(room.path(), words, 10);
+                 --error-map e.exr --quiet";
+    let message = hurried(room.path(), words, 1.5, 10);
     assert!(message.contains("an eighth of the pixels"), "{message}");
     let picture = Exr::read(&room.path().join("v.exr"));
     assert_eq!(picture.size(), (3000, 2000));
@@ -157,17 +161,16 @@ fn output_that_takes_too_long_is_coarse_and_said_to_be() {
     assert!((got / want - 1.0).abs() < 1e-3, "{got} {want}");
     assert_eq!(Exr::read(&room.path().join("e.exr")).size(), (3000, 2000));
 
-    let words =
-        "bake scenes/cornell.gltf -o o.glb --tolerance 3% --size 4096 --time-limit 1.5 --quiet";
-    let message = hurried(room.path(), words, 10);
+    let words = "bake scenes/cornell.gltf -o o.glb --tolerance 3% --size 4096 --quiet";
+    let message = hurried(room.path(), words, 1.5, 10);
     assert!(message.contains("an eighth of the texels each way"), "{message}");
     let size = Exr::read(&room.path().join("o-lightmap.exr")).size();
     assert!(size.0 <= 512 && size.1 <= 512, "{size:?}");
     assert_eq!(json(&room.path().join("o-bake.json"))["settings"]["size"], "512");
 
     let words = "bake scenes/cornell.gltf -o t.glb --tolerance 0.2% --to vertices \
-                 --max-triangles 9000000 --time-limit 2 --quiet";
-    hurried(room.path(), words, 10);
+                 --max-triangles 9000000 --quiet";
+    hurried(room.path(), words, 2.0, 10);
     assert!(room.path().join("t.glb").exists());
 }
 
@@ -179,9 +182,9 @@ fn points_that_time_does_not_suffice_for_are_empty() {
         table.push_str(&format!("{},0,0.1,0,1,0\n", 0.5 * f64::from(i) / 1e6));
     }
     fs::write(room.path().join("p.csv"), table).unwrap();
-    let words = "probe scenes/cornell.gltf --points p.csv -o r.csv --tolerance 3% --time-limit 1.5 \
+    let words = "probe scenes/cornell.gltf --points p.csv -o r.csv --tolerance 3% \
                  --report r.json";
-    let message = hurried(room.path(), words, 10);
+    let message = hurried(room.path(), words, 1.5, 10);
     assert!(message.contains("of 1000000 points have no values"), "{message}");
     let result = fs::read_to_string(room.path().join("r.csv")).unwrap();
     let columns = |line: &str| line.matches(',').count();

@@ -12,7 +12,8 @@ use std::path::Path;
 use glam::DVec3;
 use lumel::Monitor;
 use lumel::operator::Walker;
-use lumel::scene::{Override, ReadOptions, Scene, Triangle, read};
+use lumel::render::{RenderOptions, render};
+use lumel::scene::{Override, ReadOptions, Scene, Triangle, default_camera, read};
 use lumel::solve::many::is_many;
 use lumel::solve::{Light, Reflected, WithinOptions, light_within};
 use rooms::furnished;
@@ -71,6 +72,37 @@ fn rays_agree_with_exact_visibility() {
         // Both are sums over few points.
         assert!(error <= 1e-2 && 1.5 * estimate >= error, "{error:e} {estimate:e}");
     }
+}
+
+#[test]
+fn pictures_by_rays_agree_with_exact_ones() {
+    let mut room = furnished(1);
+    // All alike: what irradiance is off by is then in proportion to what is seen of it.
+    for m in &mut room.materials {
+        m.reflectance = DVec3::splat(0.5);
+    }
+    let fine = cut(&room, 3);
+    let (exact, rays) = (within(&room, 1e-3), within(&fine, 1e-2));
+    assert!(!is_by_rays(&exact) && is_by_rays(&rays));
+    let camera = default_camera(&room);
+    let options = RenderOptions { width: 160, height: 120, samples: 1, gather: true };
+    let picture = |scene, light| render(scene, light, &camera, &options, &Monitor::silent());
+    let (want, _) = picture(&room, &exact).unwrap();
+    let (got, gathered) = picture(&fine, &rays).unwrap();
+    let of_irradiance = std::f64::consts::PI / 0.5 / gathered.against;
+    let off = |(a, b): (&[f32; 3], &[f32; 3])| {
+        let difference = DVec3::from(a.map(f64::from)) - DVec3::from(b.map(f64::from));
+        (of_irradiance * difference).powf(2.0)
+    };
+    let squares: DVec3 = want.iter().zip(&got).map(off).sum();
+    let error = (squares.max_element() / want.len() as f64).sqrt();
+    let (solved, drawn) = (rays.apart().unwrap().estimate.rms, gathered.error());
+    println!("error {error:.2e}; estimates: solved {solved:.2e}, drawn {drawn:.2e}");
+    let estimate = solved.hypot(drawn);
+    assert!(error <= 1e-2 && 1.5 * estimate >= error && estimate <= 1e-2);
+    // What the solution left of the tolerance was made use of.
+    assert!(estimate >= 0.8e-2, "{estimate:e}");
+    assert!(gathered.counts.direct.gathered < gathered.counts.direct.points);
 }
 
 #[test]
