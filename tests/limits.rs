@@ -128,7 +128,7 @@ fn hurried(room: &std::path::Path, words: &str, limit: f64, seconds: u64) -> Str
     let output = lumel(room, &format!("{words} --time-limit {limit}"));
     let took = begin.elapsed();
     if limit < 10.0 && stderr(&output).contains("before there was a result") {
-        return hurried(room, words, 2.0 * limit, 2 * seconds);
+        return hurried(room, words, 2.0 * limit, seconds);
     }
     assert_eq!(code(&output), 4, "{words}: {}", stderr(&output));
     assert!(took < Duration::from_secs(4 * seconds), "{words}: {took:?}");
