@@ -16,7 +16,7 @@ mod rays;
 mod scenes;
 
 use checks::{Effort, errors, moved};
-use light::{Outcome, Truth, bright, contrast, reflecting};
+use light::{Outcome, Truth, bright, contrast, imbalance, reflecting};
 use lumel::Monitor;
 use lumel::operator::Walker;
 use lumel::scene::Scene;
@@ -85,6 +85,17 @@ fn bright_rooms_and_lamps_of_contrast_meet_their_tolerance() {
     is_within("contrast", &contrast(SEEDS.start), 2e-2);
     is_within("reflectance 0.999", &bright(SEEDS.start, 0.999), 2e-2);
     is_within("reflectance 0", &bright(SEEDS.start, 0.0), 2e-2);
+}
+
+#[test]
+fn bright_closed_rooms_keep_their_power() {
+    for seed in [1, 3] {
+        let options = WithinOptions::new(1e-2, 1 << 30);
+        let light = light_within(&bright(seed, 0.9), &options, &Monitor::silent()).unwrap();
+        let off = imbalance(&light);
+        println!("{seed}: {off:.1e}");
+        assert!(off.abs() < 4e-3, "{seed}: {off:e}");
+    }
 }
 
 #[test]

@@ -6,7 +6,8 @@
 //! those of 4 x 4 points that lie on the surface: what a lightmap holds. Every case is a process of its
 //! own; its CPU seconds are user and system time of all threads, from reading the file to the last
 //! texel, the estimate included. The error is the difference from a reference of a tolerance below the
-//! smallest of the cases, root mean square over the texels and largest, relative to the mean.
+//! smallest of the cases, root mean square over the texels and largest, relative to the mean; and root mean
+//! square over single points, every so many of them, which is what the estimate is of.
 //!
 //! For other programs (`tools/mitsuba/time_error.py`), `--texels SCENE FILE` writes the points of all
 //! texels, and `--case SCENE WAY TOLERANCE FILE` runs one case and writes its texels where there is
@@ -29,7 +30,7 @@ use serde_json::{Value, json};
 /// Scenes, tolerances from large to small, that of the reference, and how meshes follow from each
 /// other.
 const CASES: [(&str, &[f64], f64, &[&str]); 3] = [
-    ("cornell", &[3e-2, 1e-2, 3e-3, 1e-3, 3e-4], 1e-4, &WAYS),
+    ("cornell", &[3e-2, 1e-2, 3e-3, 1e-3, 3e-4], 5e-5, &WAYS),
     ("paper", &[1e-2, 1e-3, 1e-4], 5e-6, &WAYS),
     ("room", &[3e-2, 1e-2, 3e-3, 1e-3], 2.5e-4, &["uniform"]),
 ];
@@ -47,6 +48,9 @@ fn way_of(name: &str) -> Way {
 
 /// Points along each side of a texel.
 const ACROSS: usize = 4;
+
+/// Every so many of them are compared one by one.
+const POINTS: usize = 37;
 
 /// Texels over all flat surfaces of a mesh.
 struct Texels {
@@ -132,6 +136,11 @@ impl Texels {
         write_numbers(path, rows.into_iter().flatten())
     }
 
+    /// Single ones of the values at points.
+    fn some(values: &[Vec<DVec3>]) -> Vec<DVec3> {
+        values.iter().flatten().step_by(POINTS).copied().collect()
+    }
+
     fn means(&self, values: &[Vec<DVec3>]) -> Vec<DVec3> {
         let mut sums = vec![DVec3::ZERO; self.count.len()];
         for (texels, values) in self.texel.iter().zip(values) {
@@ -186,21 +195,34 @@ fn run_here(scene: &str, way: &str, tolerance: f64, reference: &Path) -> Result<
         "estimate": estimate.rms.hypot(counts.error(estimate.mean)),
         "maximum estimate": estimate.maximum + counts.largest_error(estimate.mean),
     });
+    let single = Texels::some(&values);
+    let of_points = reference.with_added_extension("points");
     if !reference.exists() {
         write_numbers(reference, means.iter().flat_map(|h| h.to_array()))?;
+        write_numbers(&of_points, single.iter().flat_map(|h| h.to_array()))?;
         return Ok(result);
     }
-    let numbers = std::fs::read(reference).map_err(failed)?;
+    let (error, maximum) = difference(&means, reference)?;
+    (result["error"], result["maximum"]) = (json!(error), json!(maximum));
+    if of_points.exists() {
+        result["error of points"] = json!(difference(&single, &of_points)?.0);
+    }
+    Ok(result)
+}
+
+/// How far values are from those in a file, relative to the mean of these: root mean square, of the
+/// channels the largest, and largest.
+fn difference(values: &[DVec3], path: &Path) -> Result<(f64, f64)> {
+    let numbers = std::fs::read(path).map_err(failed)?;
     let numbers: Vec<f64> =
         numbers.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
     let wanted: Vec<DVec3> =
         numbers.as_chunks::<3>().0.iter().map(|c| DVec3::from_array(*c)).collect();
     let mean = wanted.iter().sum::<DVec3>() / wanted.len() as f64;
-    let off: Vec<DVec3> = means.iter().zip(&wanted).map(|(a, b)| (*a - *b).abs() / mean).collect();
+    let off: Vec<DVec3> = values.iter().zip(&wanted).map(|(a, b)| (*a - *b).abs() / mean).collect();
     let squares = off.iter().map(|x| *x * *x).sum::<DVec3>() / off.len() as f64;
-    result["error"] = json!(squares.max_element().sqrt());
-    result["maximum"] = json!(off.iter().map(|x| x.max_element()).fold(0.0, f64::max));
-    Ok(result)
+    let largest = off.iter().map(|x| x.max_element()).fold(0.0, f64::max);
+    Ok((squares.max_element().sqrt(), largest))
 }
 
 /// Runs a case in a process of its own.
@@ -232,10 +254,10 @@ fn main() -> Result<()> {
         return Texels::new(&mesh).write_points(&mesh, Path::new(path));
     }
     println!(
-        "| scene | texels | way | tolerance | error rms | estimate | estimate / error | largest error | \
-         estimate of it | elements | gathers | CPU s | of it solving | memory MB |"
+        "| scene | texels | way | tolerance | error rms | at points | estimate | estimate / error at points | \
+         largest error | estimate of it | elements | gathers | CPU s | of it solving | memory MB |"
     );
-    println!("|---{}|", "|---".repeat(13));
+    println!("|---{}|", "|---".repeat(14));
     for (scene, tolerances, finest, ways) in CASES {
         if !words.iter().all(|w| scene.contains(w.as_str())) {
             continue;
@@ -244,12 +266,13 @@ fn main() -> Result<()> {
         let print = |way: &str, tolerance: f64, value: &Value| {
             let number = |name: &str| value[name].as_f64().unwrap_or(f64::NAN);
             println!(
-                "| {scene} | {} | {way} | {} % | {:.2e} | {:.2e} | {:.1} | {:.1e} | {:.1e} | {} | {} | {:.2} | {:.2} | {:.0} |",
+                "| {scene} | {} | {way} | {} % | {:.2e} | {:.2e} | {:.2e} | {:.1} | {:.1e} | {:.1e} | {} | {} | {:.2} | {:.2} | {:.0} |",
                 value["texels"],
                 100.0 * tolerance,
                 number("error"),
+                number("error of points"),
                 number("estimate"),
-                number("estimate") / number("error"),
+                number("estimate") / number("error of points"),
                 number("maximum"),
                 number("maximum estimate"),
                 value["elements"],
@@ -265,7 +288,9 @@ fn main() -> Result<()> {
         {
             print(way, tolerance, &run_apart(scene, way, tolerance, &reference)?);
         }
-        std::fs::remove_file(&reference).map_err(failed)?;
+        for file in [reference.with_added_extension("points"), reference] {
+            std::fs::remove_file(&file).map_err(failed)?;
+        }
     }
     Ok(())
 }

@@ -2,16 +2,17 @@
 //!
 //! Light that is smooth need not be gathered at every texel or pixel. A triangle that holds many of
 //! the points asked for is sampled at the six nodes of a quadratic, then at the nine further nodes of
-//! its four children: these tell whether the quadratic was right. Where it was, the points take
-//! the values of the children's quadratics, about eight times better than what was checked; where
-//! not, each child does the same with its own points, until there are so few that each is
-//! gathered.
+//! its four children. Where the polynomial of degree four through all fifteen and the children's
+//! quadratics differ little, the points take its values; where not, each child does the same with its
+//! own points, until there are so few that each is gathered. Values that are noisy take the children's
+//! quadratics, where the whole triangle's was right at the nine nodes: of degree four, noise would grow.
 
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::lattice::{Fifteen, NINE, Six, nine_nodes, part_of, quadratic};
 use crate::error::Result;
 use crate::mesh::{Mesh, barycentric, child};
 use crate::monitor::Monitor;
@@ -32,12 +33,11 @@ const BEYOND: f64 = 0.75;
 /// How many points are looked at where regions may lie beside the surface.
 const LOOKED_AT: usize = 3;
 
-/// Most points of a task of its own.
+/// Triangles of more points than this are a task of their own.
 const TASK: usize = 1024;
 
-/// Most times that a region is cut for tasks, and then a task: points may coincide.
-const DEEPEST_TASK: u32 = 20;
-const DEEPEST: u32 = 20;
+/// Most times that a region is cut: points may coincide.
+const DEEPEST: u32 = 40;
 
 /// Nodes lie this share of a region's size inside it: on its rim other faces may touch it, from where
 /// they would be seen edge on.
@@ -83,8 +83,7 @@ pub struct FillCounts {
     /// Sum of the squares of the errors that the points are expected to have because they were filled
     /// in or estimated, (W/m^2)^2, each over its region's slack.
     pub squares: DVec3,
-    /// The most that an accepted check was off by, W/m^2, over its region's slack: no filled in point is
-    /// expected to be worse.
+    /// The most that a filled in point is expected to be off by, W/m^2, over its region's slack.
     pub largest: f64,
 }
 
@@ -97,10 +96,20 @@ impl std::ops::AddAssign for FillCounts {
     }
 }
 
-/// Error of what is filled in, over what its check was off by (both root mean squares): an eighth for
-/// the third derivatives that quadratics miss, more where light is not that smooth. Measured over
-/// the shipped scenes.
+/// Error of what is filled in by quadratics, over what its check was off by (both root mean squares): an
+/// eighth for the third derivatives that quadratics miss, more where light is not that smooth. Measured
+/// over the shipped scenes.
 const OF_CHECK: f64 = 0.3;
+
+/// Where degree four is used, the check may be off by so many times what is allowed, if the
+/// polynomials differ by at most this share of it.
+const COARSE: f64 = 8.0;
+const DIFFER: f64 = 0.3;
+
+/// Error of degree four over that difference, largest and root mean square: of kinks and creases as the
+/// tests of [`super::lattice`] have them. Over the shipped scenes it was 0.6 to 1.3 (root mean square).
+const OF_DIFFERENCE: f64 = 2.5;
+const OF_DIFFERENCE_RMS: f64 = 1.4;
 
 /// Of the square of what a check was off by, what filling in made: not what the check itself is off by.
 fn of_filling(off: DVec3, check: &Estimated) -> DVec3 {
@@ -113,8 +122,8 @@ fn of_filling(off: DVec3, check: &Estimated) -> DVec3 {
 /// surface: values are checked at points that were asked for.
 ///
 /// `open` (root, triangle in its face's plane, what was made for a triangle around it) makes what
-/// points of a triangle share; `gather` (that, root and slack, point) gathers. `most` says how many points of a
-/// triangle may be filled in at once: few where something small might lie between the nodes.
+/// points of a triangle share; `gather` (that, root and slack, point) gathers. `most` says how many
+/// points of a triangle may be filled in at once: few where something small might lie between nodes.
 pub fn fill<B>(
     asked: &[Region],
     (allowed, small): (f64, bool),
@@ -123,28 +132,33 @@ pub fn fill<B>(
     most: impl Fn(&B) -> usize + Sync,
     monitor: &Monitor,
 ) -> Result<(Vec<Vec<DVec3>>, FillCounts)> {
+    let (mut values, mut counts) = (vec![], FillCounts::default());
     let mut tasks: Vec<Task> = vec![];
     for (place, own) in asked.iter().enumerate() {
+        values.push(vec![DVec3::ZERO; own.points.len()]);
+        if own.points.is_empty() {
+            continue;
+        }
         let centre = (own.corners[0] + own.corners[1] + own.corners[2]) / 3.0;
         let corners = own.corners.map(|x| x + INSIDE * (centre - x));
         let points: Vec<Asked> =
             own.points.iter().enumerate().map(|(k, &x)| Asked { x, place: k as u32 }).collect();
-        cut(Task { place, root: own.root, corners, points }, DEEPEST_TASK, &mut tasks);
+        counts.points += points.len() as u64;
+        tasks.push(Task { place, part: Part { corners, points, six: None, levels: DEEPEST } });
     }
-    let stage = monitor.stage("gather", tasks.len() as u64);
-    let done: Vec<Done> = tasks
-        .par_iter_mut()
-        .map_init(Walker::default, |walker, task| {
-            let Region { corners: t, slack, .. } = &asked[task.place];
+    let stage = monitor.stage("gather", counts.points);
+    while !tasks.is_empty() {
+        let run = |walker: &mut Walker, task: &Task| {
+            let Region { root, corners: t, slack, .. } = asked[task.place];
             let centre = (t[0] + t[1] + t[2]) / 3.0;
             let mut filler = Filler {
                 open: |corners: &[DVec2; 3], around: Option<&B>| {
                     let whole = corners.map(|x| centre + (x - centre) / (1.0 - INSIDE));
-                    open(task.root, &whole, around)
+                    open(root, &whole, around)
                 },
                 gather: |shared: &B, x| {
                     monitor.check()?;
-                    Ok(gather(walker, shared, (task.root, *slack), x))
+                    Ok(gather(walker, shared, (root, slack), x))
                 },
                 most: &most,
                 allowed: slack * allowed,
@@ -152,24 +166,27 @@ pub fn fill<B>(
                 known: HashMap::new(),
                 done: Done::default(),
             };
-            let shared = (filler.open)(&task.corners, None);
-            filler.triangle(&task.corners, &shared, None, DEEPEST, &mut task.points)?;
-            stage.advance(1)?;
+            let Part { corners, points, six, levels } = &task.part;
+            let shared = (filler.open)(corners, None);
+            filler.triangle(corners, &shared, *six, *levels, points)?;
+            stage.advance(filler.done.values.len() as u64)?;
             Ok(filler.done)
-        })
-        .collect::<Result<_>>()?;
-    let mut values: Vec<Vec<DVec3>> =
-        asked.iter().map(|own| vec![DVec3::ZERO; own.points.len()]).collect();
-    let mut counts = FillCounts::default();
-    for (task, own) in tasks.iter().zip(done) {
-        counts.points += own.values.len() as u64;
-        counts.gathered += own.gathered;
-        let slack = asked[task.place].slack;
-        counts.squares += own.squares / (slack * slack);
-        counts.largest = counts.largest.max(own.largest / slack);
-        for (k, value) in own.values {
-            values[task.place][k as usize] = value;
+        };
+        let done: Vec<Done> =
+            tasks.par_iter().map_init(Walker::default, run).collect::<Result<_>>()?;
+        let mut parts = vec![];
+        for (task, own) in tasks.iter().zip(done) {
+            let slack = asked[task.place].slack;
+            counts.gathered += own.gathered;
+            counts.squares += own.squares / (slack * slack);
+            counts.largest = counts.largest.max(own.largest / slack);
+            for (k, value) in own.values {
+                values[task.place][k as usize] = value;
+            }
+            let place = task.place;
+            parts.extend(own.parts.into_iter().map(|part| Task { place, part }));
         }
+        tasks = parts;
     }
     Ok((values, counts))
 }
@@ -183,6 +200,8 @@ struct Done {
     /// See [`FillCounts`].
     squares: DVec3,
     largest: f64,
+    /// What is left to do: quarters of it, where there are too many points to go on with.
+    parts: Vec<Part>,
 }
 
 /// A point and where its value goes.
@@ -192,40 +211,22 @@ struct Asked {
     place: u32,
 }
 
-/// A triangle and the points in it.
-struct Task {
-    place: usize,
-    root: u32,
+/// A triangle in the plane of a region and the points in it.
+struct Part {
     corners: [DVec2; 3],
     points: Vec<Asked>,
+    /// What is known of it.
+    six: Option<Six>,
+    /// How many times it may be cut.
+    levels: u32,
 }
 
-/// Cuts a task until none has too many points, at most `levels` times: points may coincide.
-fn cut(task: Task, levels: u32, tasks: &mut Vec<Task>) {
-    if task.points.is_empty() {
-        return;
-    }
-    if task.points.len() <= TASK || levels == 0 {
-        tasks.push(task);
-        return;
-    }
-    let mut parts: [Vec<Asked>; 4] = Default::default();
-    for point in task.points {
-        parts[part_of(&task.corners, point.x)].push(point);
-    }
-    for (k, points) in parts.into_iter().enumerate() {
-        cut(Task { corners: child(&task.corners, k), points, ..task }, levels - 1, tasks);
-    }
+/// A part of a region.
+struct Task {
+    /// The region.
+    place: usize,
+    part: Part,
 }
-
-/// The child that a point lies in, or nearest to.
-fn part_of(corners: &[DVec2; 3], x: DVec2) -> usize {
-    let w = barycentric(corners, x).to_array();
-    w.iter().position(|&w| w >= 0.5).unwrap_or(3)
-}
-
-/// Corners, then the midpoints of the sides opposite to them.
-type Six = [DVec3; 6];
 
 struct Filler<O, G, M> {
     open: O,
@@ -345,7 +346,7 @@ impl<O, G, M> Filler<O, G, M> {
         shared: &B,
         six: Option<Six>,
         levels: u32,
-        points: &mut [Asked],
+        points: &[Asked],
     ) -> Result<()>
     where
         M: Fn(&B) -> usize,
@@ -353,16 +354,20 @@ impl<O, G, M> Filler<O, G, M> {
         G: FnMut(&B, DVec2) -> Result<Estimated>,
     {
         let cost = if six.is_some() { FEW } else { FEW + 6 };
-        let fills = self.allowed > 0.0 && levels > 0;
+        let fills = self.allowed > 0.0;
         if fills
+            && levels > 0
             && self.small
             && (FEWEST + 1..=SMALL).contains(&points.len())
             && self.fan(corners, shared, points)?
         {
             return Ok(());
         }
-        if points.len() <= cost || !fills {
+        if levels == 0 || points.len() <= cost || !fills && points.len() <= TASK {
             return self.each(shared, points);
+        }
+        if !fills {
+            return self.quarters(corners, shared, [None; 4], levels, points);
         }
         let [a, b, c] = *corners;
         let six = match six {
@@ -376,8 +381,6 @@ impl<O, G, M> Filler<O, G, M> {
                 six
             }
         };
-        // The nine: on each side the quarter points (after the first corner, before the second),
-        // and the midpoints of the inner triangle's sides.
         let mut nine = [DVec3::ZERO; 9];
         let nodes = nine_nodes(corners);
         let (mut worst, mut squares, mut spread) = (0.0f64, DVec3::ZERO, DVec3::ZERO);
@@ -390,18 +393,30 @@ impl<O, G, M> Filler<O, G, M> {
             squares += of_filling(off, &found) / NINE.len() as f64;
             spread += found.spread * found.spread / NINE.len() as f64;
         }
-        let four = children(&six, &nine);
+        let values = Fifteen::new(&six, &nine);
+        let four = values.children();
+        // How many times too far off, and what errors are expected.
+        let (over, squares, largest) = if self.small {
+            (worst / self.allowed, OF_CHECK * OF_CHECK * squares, worst)
+        } else {
+            let (squares, most) = values.difference();
+            let over = (worst / COARSE).max(most / DIFFER) / self.allowed;
+            (over, OF_DIFFERENCE_RMS * OF_DIFFERENCE_RMS * squares, OF_DIFFERENCE * most)
+        };
+        let small = self.small;
         let filled = |x: DVec2| {
+            if !small {
+                return values.quartic(barycentric(corners, x));
+            }
             let k = part_of(corners, x);
             quadratic(&four[k], barycentric(&child(corners, k), x))
         };
-        let right = worst <= self.allowed;
-        if right
+        if over <= 1.0
             && points.len() <= (self.most)(shared)
-            && (!self.small || self.is_right_at(shared, points, filled)?)
+            && (!small || self.is_right_at(shared, points, filled)?)
         {
-            self.done.largest = self.done.largest.max(worst);
-            self.done.squares += points.len() as f64 * (OF_CHECK * OF_CHECK * squares + spread);
+            self.done.largest = self.done.largest.max(largest);
+            self.done.squares += points.len() as f64 * (squares + spread);
             for point in points.iter() {
                 self.done.values.push((point.place, filled(point.x)));
             }
@@ -409,79 +424,49 @@ impl<O, G, M> Filler<O, G, M> {
         }
         // Where a line crosses that nothing smoothes, halving the triangle halves what lies beside it:
         // after the levels that smooth light would need, are there points left to win?
-        let needed = (worst / self.allowed).log2() / 3.0;
-        if !right && points.len() as f64 <= FEW as f64 * needed.exp2() {
+        let needed = over.log2() / 3.0;
+        let is_hopeless = over > 1.0 && points.len() as f64 <= FEW as f64 * needed.exp2();
+        if is_hopeless && points.len() <= TASK {
             return self.each(shared, points);
         }
-        points.sort_by_key(|p| part_of(corners, p.x));
-        let mut begin = 0;
-        for (k, six) in four.iter().enumerate() {
-            let count = points[begin..].iter().take_while(|p| part_of(corners, p.x) == k).count();
-            let (own, part) = (&mut points[begin..begin + count], child(corners, k));
-            if count >= WORTH_OPENING {
-                let narrowed = (self.open)(&part, Some(shared));
-                self.triangle(&part, &narrowed, Some(*six), levels - 1, own)?;
-            } else {
-                self.triangle(&part, shared, Some(*six), levels - 1, own)?;
+        self.quarters(corners, shared, four.map(Some), levels, points)
+    }
+
+    /// Goes on with the four children of a triangle: at once, or as tasks of their own.
+    fn quarters<B>(
+        &mut self,
+        corners: &[DVec2; 3],
+        shared: &B,
+        six: [Option<Six>; 4],
+        levels: u32,
+        points: &[Asked],
+    ) -> Result<()>
+    where
+        M: Fn(&B) -> usize,
+        O: FnMut(&[DVec2; 3], Option<&B>) -> B,
+        G: FnMut(&B, DVec2) -> Result<Estimated>,
+    {
+        let mut of_child: [Vec<Asked>; 4] = Default::default();
+        for point in points {
+            of_child[part_of(corners, point.x)].push(*point);
+        }
+        let (apart, levels) = (points.len() > TASK, levels - 1);
+        for (k, (own, six)) in of_child.into_iter().zip(six).enumerate() {
+            let part = child(corners, k);
+            if own.is_empty() {
+                continue;
             }
-            begin += count;
+            if apart {
+                self.done.parts.push(Part { corners: part, points: own, six, levels });
+            } else if own.len() >= WORTH_OPENING {
+                let narrowed = (self.open)(&part, Some(shared));
+                self.triangle(&part, &narrowed, six, levels, &own)?;
+            } else {
+                self.triangle(&part, shared, six, levels, &own)?;
+            }
         }
         Ok(())
     }
-}
-
-/// The nine nodes of the children that are not the parent's.
-const NINE: [DVec3; 9] = [
-    // On the sides a-b, b-c, c-a.
-    DVec3::new(0.75, 0.25, 0.0),
-    DVec3::new(0.25, 0.75, 0.0),
-    DVec3::new(0.0, 0.75, 0.25),
-    DVec3::new(0.0, 0.25, 0.75),
-    DVec3::new(0.25, 0.0, 0.75),
-    DVec3::new(0.75, 0.0, 0.25),
-    // Of the sides of the inner triangle: beside a, b, c.
-    DVec3::new(0.5, 0.25, 0.25),
-    DVec3::new(0.25, 0.5, 0.25),
-    DVec3::new(0.25, 0.25, 0.5),
-];
-
-/// Their places in a triangle, as midpoints: the same bits from both triangles at a side.
-fn nine_nodes(&[a, b, c]: &[DVec2; 3]) -> [DVec2; 9] {
-    let middle = |x: DVec2, y: DVec2| 0.5 * (x + y);
-    let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-    [
-        middle(a, ab),
-        middle(ab, b),
-        middle(b, bc),
-        middle(bc, c),
-        middle(c, ca),
-        middle(ca, a),
-        middle(ab, ca),
-        middle(ab, bc),
-        middle(bc, ca),
-    ]
-}
-
-/// The quadratic through six values at barycentric weights w.
-fn quadratic(six: &Six, w: DVec3) -> DVec3 {
-    let corner = |w: f64| w * (2.0 * w - 1.0);
-    corner(w.x) * six[0]
-        + corner(w.y) * six[1]
-        + corner(w.z) * six[2]
-        + 4.0 * (w.y * w.z * six[3] + w.z * w.x * six[4] + w.x * w.y * six[5])
-}
-
-/// The six values of each child as [`child`] numbers them and their corners: [a, ab, ca],
-/// [ab, b, bc], [ca, bc, c], [bc, ca, ab].
-fn children(six: &Six, nine: &[DVec3; 9]) -> [Six; 4] {
-    let [a, b, c, bc, ca, ab] = *six;
-    let [a_ab, ab_b, b_bc, bc_c, c_ca, ca_a, by_a, by_b, by_c] = *nine;
-    [
-        [a, ab, ca, by_a, ca_a, a_ab],
-        [ab, b, bc, b_bc, by_b, ab_b],
-        [ca, bc, c, bc_c, c_ca, by_c],
-        [bc, ca, ab, by_a, by_b, by_c],
-    ]
 }
 
 #[cfg(test)]
@@ -490,27 +475,22 @@ mod tests {
 
     const T: [DVec2; 3] = [DVec2::ZERO, DVec2::new(2.0, 0.3), DVec2::new(0.4, 1.5)];
 
-    fn filled(f: impl Fn(DVec2) -> DVec3, allowed: f64) -> (f64, u64) {
+    fn filled(f: impl Fn(DVec2) -> DVec3 + Sync, allowed: f64) -> (f64, u64) {
         let mut points = vec![];
         for i in 0..120 {
             for j in 0..120 - i {
                 let w = DVec2::new(f64::from(i) + 0.3, f64::from(j) + 0.3) / 121.0;
                 let x = T[0] + w.x * (T[1] - T[0]) + w.y * (T[2] - T[0]);
-                points.push(Asked { x, place: points.len() as u32 });
+                points.push(x);
             }
         }
-        let all = points.clone();
-        let gather = |_: &(), x| Ok(Estimated::exactly(f(x)));
-        let open = |_: &[DVec2; 3], _: Option<&()>| ();
-        let most = |_: &()| usize::MAX;
-        let (known, done) = (HashMap::new(), Done::default());
-        let mut filler = Filler { open, gather, most, allowed, small: false, known, done };
-        filler.triangle(&T, &(), None, DEEPEST, &mut points).unwrap();
-        assert_eq!(filler.done.values.len(), all.len());
-        let off = |(place, value): &(u32, DVec3)| {
-            (*value - f(all[*place as usize].x)).abs().max_element()
-        };
-        (filler.done.values.iter().map(off).fold(0.0, f64::max), filler.done.gathered)
+        let asked = [Region { root: 0, corners: T, points: points.clone(), slack: 1.0 }];
+        let gather = |_: &mut Walker, _: &(), _: (u32, f64), x| Estimated::exactly(f(x));
+        let (silent, most) = (Monitor::silent(), |_: &()| usize::MAX);
+        let (values, counts) =
+            fill(&asked, (allowed, false), |_, _, _| (), gather, most, &silent).unwrap();
+        let off = values[0].iter().zip(&points).map(|(v, x)| (*v - f(*x)).abs().max_element());
+        (off.fold(0.0, f64::max), counts.gathered)
     }
 
     #[test]
@@ -528,8 +508,8 @@ mod tests {
             assert!(seen.insert(x.to_array().map(f64::to_bits)), "{x}");
             Ok(Estimated::exactly(step(x)))
         };
-        let points: Vec<DVec2> = (0..2000).map(|k| child(&T, k % 4)[k / 4 % 3]).collect();
-        let mut points: Vec<Asked> = points
+        let points: Vec<DVec2> = (0..TASK).map(|k| child(&T, k % 4)[k / 4 % 3]).collect();
+        let points: Vec<Asked> = points
             .iter()
             .enumerate()
             .map(|(k, &x)| Asked { x: x.lerp(T[k % 3], 1e-3 * (k / 3) as f64), place: k as u32 })
@@ -543,8 +523,8 @@ mod tests {
             known: HashMap::new(),
             done: Done::default(),
         };
-        filler.triangle(&T, &(), None, DEEPEST, &mut points).unwrap();
-        assert_eq!(filler.done.values.len(), 2000);
+        filler.triangle(&T, &(), None, DEEPEST, &points).unwrap();
+        assert_eq!(filler.done.values.len(), TASK);
         assert_eq!(filler.done.gathered as usize, filler.known.len());
     }
 
@@ -568,9 +548,10 @@ mod tests {
         };
         let (strict, lax) = (with(1.0), with(8.0));
         assert!(lax.gathered < strict.gathered, "{lax:?} {strict:?}");
-        assert!(lax.largest <= 1e-3 && strict.largest <= 1e-3, "{lax:?} {strict:?}");
+        let most = OF_DIFFERENCE * DIFFER * 1e-3;
+        assert!(lax.largest <= most && strict.largest <= most, "{lax:?} {strict:?}");
         let rms = |counts: FillCounts| (counts.squares.x / counts.points as f64).sqrt();
-        assert!(rms(strict) >= 1e-3 && rms(lax) >= 1e-3 && rms(lax) < 1.1e-3, "{lax:?} {strict:?}");
+        assert!(rms(strict) >= 1e-3 && rms(lax) >= 1e-3 && rms(lax) < 1.2e-3, "{lax:?} {strict:?}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 pub mod fill;
 pub mod irradiance;
+mod lattice;
 mod sheets;
 mod surface;
 mod vertices;

@@ -3,9 +3,10 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::balance::missing;
 use super::direct::{DirectField, Fineness};
 use super::levels::{Coarse, FastSolve, Start, prolonged, solve_fast};
-use super::light::{Light, Source, row_sums};
+use super::light::{Light, Source, range_of_rows};
 use super::{Solution, SolveOptions};
 use crate::cluster::Clusters;
 use crate::error::Result;
@@ -99,13 +100,24 @@ impl Apart {
                 counts.extend(solved.operator.counts());
                 counts.extend(&solved.counts);
                 counts.push(("channels solved", solved.solution.channels as u64));
+                let sums = solved.operator.row_sums(mesh.nodes());
                 let stored = Stored {
                     entries: solved.operator.entries(),
                     bytes: solved.operator.bytes(),
                     seconds: solved.operator.seconds(),
-                    row_sums: row_sums(&solved.operator, &mesh, &solved.receives),
+                    row_sums: range_of_rows(&sums, &mesh, &solved.receives),
                 };
-                (solved.solution, Some(stored))
+                let mut solution = solved.solution;
+                let accuracy = options.fast.tolerance;
+                let more = missing(&mesh, &sums, &reflectance, &solution, accuracy);
+                let nodes = solution.radiosity.iter_mut().zip(&mut solution.irradiance);
+                for ((b, w), rho) in
+                    nodes.zip(&reflectance).filter(|((b, _), _)| **b != DVec3::ZERO)
+                {
+                    *w += more;
+                    *b += *rho * more;
+                }
+                (solution, Some(stored))
             }
         };
         let stored = stored.or_else(|| coarser.map(|c| c.stored.clone())).unwrap_or_default();

@@ -170,7 +170,7 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
     let mut counts = operator.counts();
     counts.extend(left_out);
     counts.push(("channels solved", solution.channels as u64));
-    let row_sums = row_sums(&operator, &mesh, &receives);
+    let row_sums = range_of_rows(&operator.row_sums(mesh.nodes()), &mesh, &receives);
     let radiosity = &solution.radiosity;
     let source = match options.operator {
         OperatorKind::Exact => Source::Exact,
@@ -200,10 +200,8 @@ pub fn light(scene: &Scene, options: &LightOptions, monitor: &Monitor) -> Result
 }
 
 /// Smallest and largest sum of a row over pi, of roots that receive.
-pub(super) fn row_sums(operator: &Operator, mesh: &Mesh, receives: &[bool]) -> (f64, f64) {
-    operator
-        .row_sums(mesh.nodes())
-        .iter()
+pub(super) fn range_of_rows(sums: &[f64], mesh: &Mesh, receives: &[bool]) -> (f64, f64) {
+    sums.iter()
         .enumerate()
         .filter(|(node, _)| receives[mesh.element_root[node / mesh.basis.nodes()] as usize])
         .fold((f64::MAX, f64::MIN), |(a, b), (_, &s)| (a.min(s), b.max(s)))

@@ -51,6 +51,10 @@ const POINTS_OF_LAMPS: f64 = 64.0;
 const FIRST_RAYS: f64 = 512.0;
 const MORE_RAYS: u32 = 32;
 
+/// Of the tolerance, the estimated error of the solution: rays to the points that are asked for need the
+/// rest.
+const SOLUTION: f64 = 0.85;
+
 /// Patches are split so many times by what a share of these rays tells, before errors are looked at.
 const PREPARED: u32 = 5;
 const COARSE: f64 = 0.25;
@@ -259,7 +263,7 @@ impl Ladder<'_> {
                 Err(Error::Interrupted) => return Err(Error::Interrupted),
                 Err(why) => return Ok((reached, Some(why))),
             }
-            if reached.estimate.rms <= share::SOLUTION * self.options.tolerance {
+            if reached.estimate.rms <= SOLUTION * self.options.tolerance {
                 return Ok((reached, None));
             }
         }

@@ -1,6 +1,7 @@
 //! Solving (I - K) u = E: restarted GMRES, all colours in one product.
 
 pub mod apart;
+mod balance;
 mod colours;
 pub mod direct;
 mod gmres;

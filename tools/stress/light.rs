@@ -112,7 +112,7 @@ impl Truth {
 }
 
 /// What is emitted, less what is absorbed and what escapes, over the first.
-fn imbalance(light: &Light) -> f64 {
+pub fn imbalance(light: &Light) -> f64 {
     let nodes = light.mesh.basis.nodes();
     let sums: Vec<DVec3> = (0..light.mesh.nodes())
         .into_par_iter()
