@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::balance::missing;
+use super::balance::balancing;
 use super::direct::{DirectField, Fineness};
 use super::levels::{Coarse, FastSolve, Start, prolonged, solve_fast};
 use super::light::{Light, Source, range_of_rows};
@@ -109,13 +109,11 @@ impl Apart {
                 };
                 let mut solution = solved.solution;
                 let accuracy = options.fast.tolerance;
-                let more = missing(&mesh, &sums, &reflectance, &solution, accuracy);
+                let factor = balancing(&mesh, &sums, &reflectance, &solution, accuracy);
                 let nodes = solution.radiosity.iter_mut().zip(&mut solution.irradiance);
-                for ((b, w), rho) in
-                    nodes.zip(&reflectance).filter(|((b, _), _)| **b != DVec3::ZERO)
-                {
-                    *w += more;
-                    *b += *rho * more;
+                for ((b, w), rho) in nodes.zip(&reflectance) {
+                    *b += *rho * (factor - 1.0) * *w;
+                    *w *= factor;
                 }
                 (solution, Some(stored))
             }
