@@ -29,7 +29,8 @@ pub struct Radiant {
     pub field: Field,
     /// Faces that radiate.
     faces: Vec<u32>,
-    precisions: Vec<Precision>,
+    /// Bounds of relative errors, falling, and what keeps them.
+    precisions: Vec<(f64, Precision)>,
 }
 
 /// A cell on the way down.
@@ -62,8 +63,8 @@ impl Radiant {
                 (begin..end).any(|root| !field.is_dark(root))
             })
             .collect();
-        let precisions =
-            (0..PRECISIONS).map(|k| Precision::within(10f64.powf(-0.5 * k as f64))).collect();
+        let bounds = (0..PRECISIONS).map(|k| 10f64.powf(-0.5 * k as f64));
+        let precisions = bounds.map(|bound| (bound, Precision::within(bound))).collect();
         Radiant { field, faces, precisions }
     }
 
@@ -175,11 +176,7 @@ impl Radiant {
 
     /// The coarsest precision with relative errors of at most `bound`.
     fn precision(&self, bound: f64) -> &Precision {
-        let k = (-2.0 * bound.log10()).ceil();
-        if k < PRECISIONS as f64 {
-            &self.precisions[k.max(0.0) as usize]
-        } else {
-            &Precision::EXACT
-        }
+        let place = self.precisions.partition_point(|known| known.0 > bound);
+        self.precisions.get(place).map_or(&Precision::EXACT, |known| &known.1)
     }
 }
