@@ -174,9 +174,9 @@ impl Radiant {
         sum
     }
 
-    /// The coarsest precision with relative errors of at most `bound`.
+    /// The coarsest precision with relative errors of at most `bound`; exact where that is no number.
     fn precision(&self, bound: f64) -> &Precision {
-        let place = self.precisions.partition_point(|known| known.0 > bound);
-        self.precisions.get(place).map_or(&Precision::EXACT, |known| &known.1)
+        let found = self.precisions.iter().find(|known| known.0 <= bound);
+        found.map_or(&Precision::EXACT, |known| &known.1)
     }
 }

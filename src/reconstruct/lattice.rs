@@ -48,11 +48,7 @@ pub fn nine_nodes(&[a, b, c]: &[DVec2; 3]) -> [DVec2; 9] {
 
 /// The child that a point lies in, or nearest to.
 pub fn part_of(corners: &[DVec2; 3], x: DVec2) -> usize {
-    part_at(barycentric(corners, x))
-}
-
-fn part_at(w: DVec3) -> usize {
-    w.to_array().iter().position(|&w| w >= 0.5).unwrap_or(3)
+    barycentric(corners, x).to_array().iter().position(|&w| w >= 0.5).unwrap_or(3)
 }
 
 /// The quadratic through six values at barycentric weights w.
