@@ -4,6 +4,7 @@ mod common;
 #[allow(dead_code)]
 #[path = "common/random.rs"]
 mod random;
+#[allow(dead_code)]
 #[path = "common/rooms.rs"]
 mod rooms;
 

@@ -152,6 +152,10 @@ impl Radiant {
         } else {
             let fit = &self.field.fits[cell.number as usize];
             let size = fit.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
+            if size == 0.0 {
+                walker.active.truncate(to);
+                return DVec3::ZERO;
+            }
             let precision =
                 self.precision(OF_INTEGRAL * allowed * PI * square / (cell.area * size));
             let m = if clear {

@@ -7,6 +7,7 @@ use super::balance::balancing;
 use super::direct::{DirectField, Fineness};
 use super::levels::{Coarse, FastSolve, Start, prolonged, solve_fast};
 use super::light::{Light, Source, range_of_rows};
+use super::missed::missed;
 use super::{Solution, SolveOptions};
 use crate::cluster::Clusters;
 use crate::error::Result;
@@ -96,7 +97,16 @@ impl Apart {
                     solve: options.solve,
                     max_memory: options.max_memory,
                 };
-                let solved = solve_fast(stage, &reflectance, &first, &how, monitor)?;
+                let missed = missed(&field, stage, options.fineness.deviation, monitor)?;
+                let spots = missed.as_ref().map_or(&[][..], |missed| &missed.elements);
+                counts.push(("elements with spots", spots.len() as u64));
+                let mut sent = first;
+                if let Some(missed) = &missed {
+                    for ((b, rho), w) in sent.iter_mut().zip(&reflectance).zip(&missed.irradiance) {
+                        *b += *rho * *w;
+                    }
+                }
+                let solved = solve_fast(stage, &reflectance, &sent, &how, monitor)?;
                 counts.extend(solved.operator.counts());
                 counts.extend(&solved.counts);
                 counts.push(("channels solved", solved.solution.channels as u64));
@@ -109,11 +119,24 @@ impl Apart {
                 };
                 let mut solution = solved.solution;
                 let accuracy = options.fast.tolerance;
-                let factor = balancing(&mesh, &sums, &reflectance, &solution, accuracy);
+                let factor = balancing(
+                    &mesh,
+                    &solved.operator,
+                    &sums,
+                    &reflectance,
+                    &solution,
+                    spots,
+                    accuracy,
+                );
                 let nodes = solution.radiosity.iter_mut().zip(&mut solution.irradiance);
                 for ((b, w), rho) in nodes.zip(&reflectance) {
                     *b += *rho * (factor - 1.0) * *w;
                     *w *= factor;
+                }
+                if let Some(missed) = &missed {
+                    for (w, missed) in solution.irradiance.iter_mut().zip(&missed.irradiance) {
+                        *w += *missed;
+                    }
                 }
                 (solution, Some(stored))
             }

@@ -231,8 +231,17 @@ impl DirectField {
         self.on_elements(mesh, |cell| cell.irradiance)
     }
 
+    /// rho H_d on the tree.
+    pub fn reflected_once(&self) -> Field {
+        self.field(|cell| times(&cell.irradiance, &cell.reflectance))
+    }
+
+    fn field(&self, of_leaf: impl Fn(&DirectCell) -> Fit<3>) -> Field {
+        Field::new(self.tree.clone(), self.cells.iter().map(of_leaf).collect())
+    }
+
     fn on_elements(&self, mesh: &Mesh, of_leaf: impl Fn(&DirectCell) -> Fit<3>) -> Vec<DVec3> {
-        let field = Field::new(self.tree.clone(), self.cells.iter().map(of_leaf).collect());
+        let field = self.field(of_leaf);
         let mut nodes = vec![DVec3::ZERO; mesh.nodes()];
         self.for_elements(mesh, |element, cell| {
             for (j, value) in field.fits[cell as usize].iter().enumerate() {
@@ -269,7 +278,7 @@ impl DirectField {
     }
 
     /// Calls `see` with each element of a mesh and its cell.
-    fn for_elements(&self, mesh: &Mesh, mut see: impl FnMut(usize, u32)) {
+    pub fn for_elements(&self, mesh: &Mesh, mut see: impl FnMut(usize, u32)) {
         for (number, root) in mesh.roots.iter().enumerate() {
             for index in 0..1u32 << (2 * root.level) {
                 let mut cell = Some(number as u32);

@@ -8,6 +8,7 @@ mod gmres;
 pub mod levels;
 pub mod light;
 pub mod many;
+pub mod missed;
 pub mod samples;
 pub mod within;
 

@@ -74,6 +74,34 @@ pub fn furnished(seed: u64) -> Scene {
     room
 }
 
+/// A furnished room with a few small bright lamps, each close to a wall and facing it: spots of light
+/// that are smaller than elements, and lamps that are in the way of their light. Other lamps are dim.
+pub fn with_spots(seed: u64) -> Scene {
+    let mut room = furnished(seed);
+    let mut random = Random::new(seed ^ 0x5907);
+    for own in &mut room.materials {
+        own.radiance *= random.within(0.0, 0.05);
+    }
+    let corners = || room.triangles.iter().flat_map(|t| t.vertices);
+    let size = corners().fold(DVec3::ZERO, DVec3::max);
+    let lamp = room.materials.len() as u32;
+    room.materials.push(material("spot", 0.0, random.within(10.0, 40.0)));
+    for _ in 0..1 + random.below(3) {
+        let (half, away) = (random.within(0.01, 0.05), random.within(0.02, 0.2));
+        let across = size.z * random.within(0.05, 0.95);
+        let up = size.y * random.within(0.3, 0.95);
+        let p = |y: f64, z: f64| dvec3(away, up + y * half, across + z * half);
+        let quad = [p(-1.0, -1.0), p(-1.0, 1.0), p(1.0, 1.0), p(1.0, -1.0)];
+        // On one wall or on the one opposite; the order of the corners has it face the wall.
+        let opposite = random.below(2) == 1;
+        let turned = |p: DVec3| dvec3(size.x - p.x, p.y, p.z);
+        let quad = if opposite { [0, 3, 2, 1].map(|k| turned(quad[k])) } else { quad };
+        room.triangles.push(triangle([quad[0], quad[1], quad[2]], lamp));
+        room.triangles.push(triangle([quad[0], quad[2], quad[3]], lamp));
+    }
+    room
+}
+
 /// Adds quads, turned about the vertical and moved, but kept inside the room.
 fn place(quads: &mut Quads, own: &Quads, at: DVec3, angle: f64, size: DVec3) {
     let (s, c) = angle.sin_cos();
