@@ -27,8 +27,10 @@ pub struct ApartOptions {
     pub fineness: Fineness,
     /// The operator.
     pub fast: FastOptions,
-    /// Stopping.
+    /// Stopping, relative to the mean irradiance.
     pub solve: SolveOptions,
+    /// About the mean irradiance, W/m^2.
+    pub mean: DVec3,
     /// Bytes that the operator may take.
     pub max_memory: u64,
     /// Gather indirect light at the nodes from the coarser solution instead of solving; errors that a
@@ -91,12 +93,6 @@ impl Apart {
                 (Solution { radiosity, irradiance: w, ..coarser.solution.clone() }, None)
             }
             _ => {
-                let how = FastSolve {
-                    start: coarse.as_ref().map_or(Start::Unknown, Start::Coarse),
-                    fast: options.fast,
-                    solve: options.solve,
-                    max_memory: options.max_memory,
-                };
                 let missed = missed(&field, stage, options.fineness.deviation, monitor)?;
                 let spots = missed.as_ref().map_or(&[][..], |missed| &missed.elements);
                 counts.push(("elements with spots", spots.len() as u64));
@@ -106,6 +102,12 @@ impl Apart {
                         *b += *rho * *w;
                     }
                 }
+                let how = FastSolve {
+                    start: coarse.as_ref().map_or(Start::Unknown, Start::Coarse),
+                    fast: options.fast,
+                    solve: options.solve.relative_to(options.mean, &sent),
+                    max_memory: options.max_memory,
+                };
                 let solved = solve_fast(stage, &reflectance, &sent, &how, monitor)?;
                 counts.extend(solved.operator.counts());
                 counts.extend(&solved.counts);

@@ -14,7 +14,7 @@ use super::direct::emission;
 use super::light::{ApartSource, Light, RaySource, Reflected, Source};
 use super::samples::{Sample, samples};
 use super::within::{Estimate, largest, mean_emission, relative, rms, share, why_not};
-use super::{Solution, SolveOptions, WithinOptions, gmres};
+use super::{LEAST_RESIDUAL, Solution, SolveOptions, WithinOptions, gmres};
 use crate::cluster::Clusters;
 use crate::error::{Error, Result};
 use crate::mesh::{self, Mesh};
@@ -358,8 +358,10 @@ impl Ladder<'_> {
                 |((out, u), (h, rho))| *out = std::array::from_fn(|c| u[c] - rho[c] * h[c]),
             );
         };
-        let residual = (share::RESIDUAL * tolerance).clamp(1e-13, 1e-3);
+        let residual = (share::RESIDUAL * tolerance).clamp(LEAST_RESIDUAL, 1e-3);
         let how = SolveOptions { residual, ..SolveOptions::default() };
+        let sent: Vec<DVec3> = begin.iter().map(|b| DVec3::from_array(*b)).collect();
+        let how = how.relative_to(self.emitted, &sent);
         let (u, residual, iterations) = gmres(&apply, &begin, None, &how, self.monitor)?;
         // What is not a number has not converged either.
         if !residual.iter().all(|&r| r <= how.residual) {

@@ -12,12 +12,12 @@ use std::time::Instant;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::SolveOptions;
 use super::apart::{Apart, ApartOptions};
 use super::direct::{Fineness, emission, surface_area};
 use super::light::{ApartSource, FORECAST_FROM, Light, Reflected, Source};
 use super::many::{is_many, light_of_many};
 use super::samples::{Sample, samples};
+use super::{LEAST_RESIDUAL, SolveOptions};
 use crate::cluster::Clusters;
 use crate::cluster::fit::Fit;
 use crate::error::{Error, Result};
@@ -307,9 +307,10 @@ impl Ladder<'_> {
             },
             fast: FastOptions::new((operator * tolerance).clamp(1e-10, 1e-2), None, None)?,
             solve: SolveOptions {
-                residual: (share::RESIDUAL * tolerance).clamp(1e-13, 1e-3),
+                residual: (share::RESIDUAL * tolerance).clamp(LEAST_RESIDUAL, 1e-3),
                 ..SolveOptions::default()
             },
+            mean,
             max_memory,
             sweep: match before {
                 Some(before) if self.options.way == Way::Iterated => {
