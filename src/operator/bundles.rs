@@ -22,6 +22,7 @@ use rayon::prelude::*;
 use super::hemisphere::{direction, flips, near_ones_together};
 use super::lamps::{Lamps, Place, Samples};
 use super::patches::{CELLS, Patches, SPOTS, Spot};
+use super::ray_gather::RayRadiant;
 use super::walk::Walker;
 use crate::error::{Error, Result};
 use crate::geometry::{COINCIDENCE, RayTree};
@@ -117,19 +118,23 @@ impl RayScene {
 
 /// Rows of an operator on cells of patches: irradiance of each is a mean of the radiosities of
 /// cells that rays from its spots meet.
+#[derive(Default)]
 pub struct Rows {
     /// Cell and weight, and where those of each row are.
     entries: Vec<(u32, f32)>,
     ranges: Vec<Range<usize>>,
     /// Whether all spots of a cell are under something: they do not count.
     buried: Vec<bool>,
+    /// Share of the rays of each cell that meet something that radiates.
+    met: Vec<f32>,
     /// Emitted light that arrives at each cell, W/m^2.
     pub direct: Vec<[f64; 3]>,
 }
 
 impl Rows {
-    /// Casts rays from the spots of each cell, and looks at points of `lamps`. Spots of patches that
-    /// have none in the open, but are seen, are moved to where they are seen.
+    /// Casts rays from the spots of each cell, and looks at points of `lamps` and of what is bright of
+    /// the patches `before`. Spots of patches that have none in the open, but are seen, are moved to
+    /// where they are seen.
     ///
     /// # Errors
     ///
@@ -138,26 +143,29 @@ impl Rows {
         scene: &RayScene,
         mesh: &Mesh,
         patches: &mut Patches,
+        before: Option<&RayRadiant>,
         (lamps, samples): (&Lamps, Samples),
         max_memory: u64,
         monitor: &Monitor,
     ) -> Result<Rows> {
         let count = patches.count_of_cells();
         let stage = monitor.stage("rays", count as u64);
-        let mut rows = Rows { entries: vec![], ranges: vec![], buried: vec![], direct: vec![] };
+        let mut rows = Rows::default();
+        let bright = before.filter(|before| !before.bright.is_empty());
         // In blocks, so that memory is known before it is too much.
         for begin in (0..count).step_by(BLOCK) {
             let found: Vec<Option<Row>> = (begin..(begin + BLOCK).min(count))
                 .into_par_iter()
                 .map_init(Walker::default, |walker, cell| {
                     stage.advance(1)?;
-                    Ok(row(scene, mesh, patches, (lamps, samples), walker, cell))
+                    Ok(row(scene, mesh, patches, bright, (lamps, samples), walker, cell))
                 })
                 .collect::<Result<_>>()?;
             for own in found {
                 rows.buried.push(own.is_none());
                 let own = own.unwrap_or_default();
                 rows.direct.push(own.direct.to_array());
+                rows.met.push(own.met);
                 let begin = rows.entries.len();
                 rows.entries.extend(own.entries);
                 rows.ranges.push(begin..rows.entries.len());
@@ -179,7 +187,7 @@ impl Rows {
             let again: Vec<(usize, Option<Row>)> = moved
                 .into_par_iter()
                 .map_init(Walker::default, |walker, cell| {
-                    (cell, row(scene, mesh, patches, (lamps, samples), walker, cell))
+                    (cell, row(scene, mesh, patches, bright, (lamps, samples), walker, cell))
                 })
                 .collect();
             for (cell, own) in again {
@@ -188,6 +196,7 @@ impl Rows {
                 rows.entries.extend(own.entries);
                 rows.ranges[cell] = begin..rows.entries.len();
                 rows.direct[cell] = own.direct.to_array();
+                rows.met[cell] = own.met;
                 rows.buried[cell] = false;
             }
         }
@@ -299,11 +308,8 @@ impl Rows {
     /// that are not buried.
     pub fn sums(&self) -> (f64, f64) {
         let mut all = (1.0f64, 0.0f64);
-        for (range, buried) in self.ranges.iter().zip(&self.buried) {
-            let sum: f64 = self.entries[range.clone()].iter().map(|e| f64::from(e.1)).sum();
-            if !buried {
-                all = (all.0.min(sum), all.1.max(sum));
-            }
+        for (&met, _) in self.met.iter().zip(&self.buried).filter(|(_, buried)| !**buried) {
+            all = (all.0.min(f64::from(met)), all.1.max(f64::from(met)));
         }
         all
     }
@@ -321,6 +327,10 @@ impl Rows {
 
 /// Cells whose rays are cast before memory is looked at.
 const BLOCK: usize = 16_384;
+
+/// Bright cells, of which there are few, look at so many times as many rays and points: what they are
+/// off by counts for much.
+const OF_BRIGHT: u32 = 8;
 
 /// Rays from a spot, at least.
 const FROM_EACH: u32 = 4;
@@ -354,13 +364,16 @@ fn cast_from(
 #[derive(Default)]
 struct Row {
     entries: Vec<(u32, f32)>,
+    met: f32,
     direct: DVec3,
 }
 
 /// What one spot sees.
 #[derive(Clone, Default)]
 struct Seen {
-    cells: Vec<u32>,
+    /// Cells that rays and points found, and what these count.
+    cells: Vec<(u32, f64)>,
+    met: u32,
     rays: u32,
     black: u32,
     direct: DVec3,
@@ -371,11 +384,17 @@ fn row(
     scene: &RayScene,
     mesh: &Mesh,
     patches: &Patches,
+    before: Option<&RayRadiant>,
     (lamps, samples): (&Lamps, Samples),
     walker: &mut Walker,
     cell: usize,
 ) -> Option<Row> {
     let spots = patches.spots(cell);
+    let more = match before {
+        Some(known) if known.is_bright(spots[0].face, spots[0].x) => OF_BRIGHT,
+        _ => 1,
+    };
+    let samples = Samples { points: more * samples.points, rays: more * samples.rays };
     let mut seen = vec![];
     cast_from(scene, mesh, spots, samples, walker, |number, towards, met| {
         seen.resize(number + 1, Seen::default());
@@ -383,16 +402,18 @@ fn row(
         own.rays += 1;
         match met {
             Met::Face { face, x, square, cosine } => {
-                own.cells.push(patches.at(face, x) as u32);
-                let n = mesh.faces[spots[number].face as usize].frame.n;
-                own.direct += lamps.met(face, square, cosine * towards.dot(n), samples);
+                let cosines = cosine * towards.dot(mesh.faces[spots[number].face as usize].frame.n);
+                let weight = before.map_or(1.0, |b| b.weight_of_ray(face, x, square, cosines));
+                own.cells.push((patches.at(face, x) as u32, weight));
+                own.met += 1;
+                own.direct += lamps.met(face, square, cosines, samples);
             }
             Met::Black => own.black += 1,
             Met::Nothing => {}
         }
     });
     let each = samples.points / seen.len() as u32;
-    let (mut all, mut direct, mut rays) = (vec![], DVec3::ZERO, 0);
+    let (mut all, mut direct, mut rays, mut met) = (vec![], DVec3::ZERO, 0, 0);
     for (number, own) in seen.into_iter().enumerate() {
         if f64::from(own.black) > BURIED * f64::from(own.rays) {
             continue;
@@ -402,13 +423,20 @@ fn row(
         let which = (number as u32 * each, each);
         direct += own.direct + lamps.by_points(walker, scene, place, which, samples).seen;
         all.extend(own.cells);
-        rays += own.rays;
+        (rays, met) = (rays + own.rays, met + own.met);
+        for k in before.iter().flat_map(|_| scene.in_order(number as u32 * own.rays, own.rays)) {
+            let bright = before.and_then(|b| b.bright.point((scene, mesh), walker, place, k));
+            all.extend(bright.map(|seen| (patches.at(seen.face, seen.x) as u32, seen.weight)));
+        }
     }
     if rays == 0 {
         return None;
     }
-    all.sort_unstable();
-    let share = |count: usize| (count as f64 / f64::from(rays)) as f32;
-    let entries = all.chunk_by(|a, b| a == b).map(|same| (same[0], share(same.len()))).collect();
-    Some(Row { entries, direct: direct * f64::from(samples.rays) / f64::from(rays) })
+    all.sort_by_key(|found| found.0);
+    let rays = f64::from(rays);
+    let share = |same: &[(u32, f64)]| same.iter().map(|found| found.1).sum::<f64>() / rays;
+    let same = all.chunk_by(|a, b| a.0 == b.0);
+    let entries = same.map(|same| (same[0].0, share(same) as f32)).collect();
+    let met = (f64::from(met) / rays) as f32;
+    Some(Row { entries, met, direct: direct * f64::from(samples.rays) / rays })
 }

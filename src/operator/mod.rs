@@ -4,6 +4,7 @@
 //! (2.10) is diag(rho/pi) A. Everything here is colour-blind: geometry, never reflectance.
 
 pub mod beam;
+pub mod bright;
 pub mod bundles;
 pub mod clustered;
 pub mod exact;

@@ -225,21 +225,8 @@ impl Patches {
 
     /// Adds patches of the given shapes, but for empty ones.
     fn add(&mut self, scene: &Scene, mesh: &Mesh, shapes: Vec<Shape>) {
-        let parts: Vec<Vec<Part>> = shapes
-            .par_iter()
-            .map(|shape| match shape {
-                Shape::Square { face, low, side, .. } => {
-                    quarters(scene, &mesh.faces[*face as usize], *face, (*low, *side))
-                }
-                Shape::Cube { faces, .. } => {
-                    let whole = |&f: &u32| {
-                        let face = &mesh.faces[f as usize];
-                        part(scene, face, f, &face.corners)
-                    };
-                    faces.iter().map(whole).collect()
-                }
-            })
-            .collect();
+        let parts: Vec<Vec<Part>> =
+            shapes.par_iter().map(|shape| parts(scene, mesh, shape)).collect();
         let found = std::mem::take(&mut self.found);
         for ((shape, parts), found) in shapes.into_iter().zip(parts).zip(found) {
             if parts.is_empty() {
@@ -315,6 +302,26 @@ impl Patches {
     pub fn cells(&self, patch: usize) -> std::ops::Range<usize> {
         let begin = if patch == 0 { 0 } else { self.ends[patch - 1] };
         begin..self.ends[patch]
+    }
+
+    /// What the cells of a patch are made of: convex polygons in the planes of faces, each with the
+    /// numbers of its cell and its face.
+    pub fn polygons(
+        &self,
+        scene: &Scene,
+        mesh: &Mesh,
+        patch: usize,
+    ) -> Vec<(usize, u32, Vec<DVec2>)> {
+        let parts = parts(scene, mesh, &self.shapes[patch]);
+        let of_cell: Vec<usize> = match &self.shapes[patch] {
+            Shape::Square { .. } => (0..parts.len()).collect(),
+            Shape::Cube { .. } => {
+                let runs = in_quarters(&parts);
+                runs.iter().enumerate().flat_map(|(k, run)| vec![k; run.len()]).collect()
+            }
+        };
+        let first = self.cells(patch).start;
+        of_cell.into_iter().zip(parts).map(|(k, p)| (first + k, p.face, p.polygon)).collect()
     }
 
     /// Puts the spots of a patch at other points of it, one or more.
@@ -518,6 +525,22 @@ fn in_quarters(parts: &[Part]) -> Vec<&[Part]> {
     let mut first: Vec<usize> = (0..parts.len()).filter(begins).collect();
     first.push(parts.len());
     first.windows(2).map(|run| &parts[run[0]..run[1]]).collect()
+}
+
+/// What a patch is made of.
+fn parts(scene: &Scene, mesh: &Mesh, shape: &Shape) -> Vec<Part> {
+    match shape {
+        Shape::Square { face, low, side, .. } => {
+            quarters(scene, &mesh.faces[*face as usize], *face, (*low, *side))
+        }
+        Shape::Cube { faces, .. } => {
+            let whole = |&f: &u32| {
+                let face = &mesh.faces[f as usize];
+                part(scene, face, f, &face.corners)
+            };
+            faces.iter().map(whole).collect()
+        }
+    }
 }
 
 /// The parts of a face in the four quarters of a square.

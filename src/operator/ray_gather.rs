@@ -13,6 +13,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
+use super::bright::{Bright, Point};
 use super::bundles::{Met, RayScene};
 use super::hemisphere::{direction, flips_for};
 use super::lamps::{Lamps, Lit, Place, Samples};
@@ -20,6 +21,7 @@ use super::patches::Patches;
 use super::walk::Walker;
 use crate::geometry::Frame;
 use crate::mesh::Mesh;
+use crate::scene::Scene;
 
 /// What patches radiate, ready for gathering.
 pub struct RayRadiant {
@@ -30,11 +32,17 @@ pub struct RayRadiant {
     /// Area of each cell over pi, m^2, times the square of the share of its patch's largest
     /// radiosity by which light was found to vary there.
     pub unevenness: Vec<f64>,
+    /// Cells that points are spread over as well.
+    pub bright: Bright,
 }
 
 impl RayRadiant {
     /// Radiosities of cells, and what is known of how these vary.
-    pub fn new(radiosity: Vec<DVec3>, patches: Patches) -> RayRadiant {
+    pub fn new(
+        (scene, mesh): (&Scene, &Mesh),
+        radiosity: Vec<DVec3>,
+        patches: Patches,
+    ) -> RayRadiant {
         let unevenness = (0..patches.len())
             .flat_map(|patch| {
                 let [least, most] = patches.found[patch];
@@ -44,7 +52,22 @@ impl RayRadiant {
                 patches.cells(patch).map(move |cell| varies * varies * area[cell] / PI)
             })
             .collect();
-        RayRadiant { radiosity, patches, unevenness }
+        let bright = Bright::new(scene, mesh, &patches, &radiosity);
+        RayRadiant { radiosity, patches, unevenness, bright }
+    }
+
+    /// What a ray counts that met a point of a face from a distance `square` (squared) at cosines
+    /// whose product is `cosines`: points may find it as well.
+    pub fn weight_of_ray(&self, face: u32, x: DVec2, square: f64, cosines: f64) -> f64 {
+        if self.bright.is_empty() {
+            return 1.0;
+        }
+        self.bright.weight_of_ray(self.patches.at(face, x), square, cosines)
+    }
+
+    /// Whether the cell at a point of a face is bright.
+    pub fn is_bright(&self, face: u32, x: DVec2) -> bool {
+        self.bright.has(self.patches.at(face, x))
     }
 
     /// Whether the mean of a cell will do for a ray that met it at a distance (squared) at a cosine,
@@ -52,8 +75,10 @@ impl RayRadiant {
     fn is_even(&self, cell: usize, square: f64, cosine: f64, rays: u32) -> bool {
         // About so many rays meet the cell; it fills no more than the hemisphere.
         let varies = self.unevenness[cell];
-        let met = (varies * cosine / square).min(varies * PI / self.patches.area[cell]);
-        met * f64::from(rays) <= EVEN
+        let area = self.patches.area[cell];
+        let met = (varies * cosine / square).min(varies * PI / area) * f64::from(rays);
+        let points = varies * PI * self.bright.points_in(cell, rays);
+        met + points <= EVEN
     }
 }
 
@@ -152,6 +177,9 @@ const OF_HALF: f64 = std::f64::consts::SQRT_2;
 /// that meet it is more than this. With 4 pictures take a tenth less, but an arcade is solved a fifth worse.
 const EVEN: f64 = 1.0;
 
+/// Flips of the ways on from points.
+const OF_POINTS: u64 = 1 << 41;
+
 /// Ways that a ray goes on, at most.
 const MOST_BOUNCES: u64 = 8;
 
@@ -199,12 +227,27 @@ impl Sources<'_> {
                         let rays = counts.least;
                         let (found, change) =
                             self.along(radiant, walker, (scene, mesh), start, (k, rays, flips));
-                        sum.reflected += found;
-                        sum.change += change;
+                        let cosines = cosine * towards.dot(normal);
+                        let weight = radiant.weight_of_ray(face, x, square, cosines);
+                        sum.reflected += weight * found;
+                        sum.change += weight * change;
                     }
                     if let Some(lamps) = self.emitted {
                         let cosines = cosine * towards.dot(normal);
                         sum.lit.seen += lamps.met(face, square, cosines, EACH);
+                    }
+                }
+            }
+            if let Some(radiant) = self.reflected.filter(|radiant| !radiant.bright.is_empty()) {
+                for k in scene.in_order(first, block) {
+                    if let Some(seen) = radiant.bright.point((scene, mesh), walker, place, k) {
+                        let Point { face, x, square, cosine, weight } = seen;
+                        let (start, rays) = ((face, x, square, cosine), counts.least);
+                        let which = (k, rays, flips_for(flips, OF_POINTS));
+                        let (found, change) =
+                            self.along(radiant, walker, (scene, mesh), start, which);
+                        sum.reflected += weight * found;
+                        sum.change += weight * change;
                     }
                 }
             }
@@ -250,11 +293,9 @@ impl Sources<'_> {
         for bounce in 0u64.. {
             let cell = radiant.patches.at(face, x);
             if bounce == MOST_BOUNCES || radiant.is_even(cell, square, cosine, rays) {
-                let own = radiant.radiosity[cell];
+                let (own, more) = self.of_cell(radiant, face, x);
                 sum += weight * own;
-                if let Some(before) = self.before {
-                    change = weight * (own - before.radiosity[before.patches.at(face, x)]);
-                }
+                change += weight * more;
                 break;
             }
             weight *= radiant.patches.reflectance[cell];
@@ -264,16 +305,34 @@ impl Sources<'_> {
             let place = Place { point, normal, flips };
             let lit = self.lamps.by_points(walker, scene, place, (number, 1), EACH);
             sum += weight * lit.seen;
+            if !radiant.bright.is_empty()
+                && let Some(seen) = radiant.bright.point((scene, mesh), walker, place, number)
+            {
+                let (own, more) = self.of_cell(radiant, seen.face, seen.x);
+                sum += weight * seen.weight * own;
+                change += weight * seen.weight * more;
+            }
             let towards = direction(own, number, flips);
             let Met::Face { face: next, x: at, square: far, cosine: from } =
                 scene.cast(walker, mesh, point, towards)
             else {
                 break;
             };
-            sum += weight * self.lamps.met(next, far, from * towards.dot(normal), EACH);
+            let cosines = from * towards.dot(normal);
+            sum += weight * self.lamps.met(next, far, cosines, EACH);
+            weight *= radiant.weight_of_ray(next, at, far, cosines);
             (face, x, square, cosine) = (next, at, far, from);
         }
         (sum, change)
+    }
+}
+
+impl Sources<'_> {
+    /// The mean radiosity of the cell at a point of a face, and what it is more than before.
+    fn of_cell(&self, radiant: &RayRadiant, face: u32, x: DVec2) -> (DVec3, DVec3) {
+        let of = |radiant: &RayRadiant| radiant.radiosity[radiant.patches.at(face, x)];
+        let own = of(radiant);
+        (own, self.before.map_or(DVec3::ZERO, |before| own - of(before)))
     }
 }
 

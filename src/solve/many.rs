@@ -51,6 +51,11 @@ const POINTS_OF_LAMPS: f64 = 64.0;
 const FIRST_RAYS: f64 = 512.0;
 const MORE_RAYS: u32 = 32;
 
+/// At samples where these leave more than so many times the tolerance, so many times as many: a few of
+/// them would be most of the estimate.
+const OF_SAMPLE: f64 = 2.0;
+const FOR_SAMPLES: u32 = 16;
+
 /// Of the tolerance, the estimated error of the solution: rays to the points that are asked for need the
 /// rest.
 const SOLUTION: f64 = 0.85;
@@ -296,7 +301,16 @@ impl Ladder<'_> {
                 self.monitor.check()?;
                 let place = Place::new(s.point, s.normal);
                 let scene = (&self.rays.scene, mesh);
-                Ok(sources.gather(walker, scene, place, enough, self.rays.counts))
+                let counts = self.rays.counts;
+                let found = sources.gather(walker, scene, place, enough, counts);
+                let tolerated = OF_SAMPLE * tolerance * mean.max_element();
+                if found.spread.max_element() <= tolerated {
+                    return Ok(found);
+                }
+                let per_root = tolerated / f64::from(counts.most).sqrt();
+                let counts = RayCounts { most: counts.most * FOR_SAMPLES, ..counts };
+                let enough = Enough { per_root, ..enough };
+                Ok(sources.gather(walker, scene, place, enough, counts))
             })
             .collect::<Result<_>>()?;
         let at_samples: Vec<DVec3> = found.iter().map(|e| e.irradiance).collect();
@@ -348,7 +362,8 @@ impl Ladder<'_> {
         };
         let max_memory = self.options.max_memory;
         let (scene, lamps) = (&self.rays.scene, (&self.rays.lamps, samples));
-        let rows = Rows::cast(scene, mesh, &mut patches, lamps, max_memory, self.monitor)?;
+        let known = before.map(|before| &before.radiant);
+        let rows = Rows::cast(scene, mesh, &mut patches, known, lamps, max_memory, self.monitor)?;
         let direct = rows.of_cells(&patches, rows.direct.clone());
         let begin: Vec<[f64; 3]> = times(&direct, &patches.reflectance);
         let apply = |u: &[[f64; 3]], out: &mut [[f64; 3]]| {
@@ -381,7 +396,7 @@ impl Ladder<'_> {
         let varies = self.varies(&patches);
         let vectors = |x: Vec<[f64; 3]>| x.into_iter().map(DVec3::from_array).collect();
         Ok(Step {
-            radiant: RayRadiant::new(vectors(radiosity), patches),
+            radiant: RayRadiant::new((self.scene, mesh), vectors(radiosity), patches),
             irradiance: vectors(irradiance),
             varies,
             entries: rows.entries(),
