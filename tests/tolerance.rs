@@ -69,12 +69,52 @@ fn difference(got: &[DVec3], want: &[DVec3]) -> f64 {
     (squares / (mean * mean)).max_element().sqrt()
 }
 
+/// Random points, as many by area as by irradiance (a spot of little area may hold most of the squared
+/// error), with their weights in a mean over the surface: roots, points in their planes, weights.
+fn weighed_points(light: &Light, count: usize, seed: u64) -> Vec<(u32, DVec2, f64)> {
+    let (mesh, nodes) = (&light.mesh, light.mesh.basis.nodes());
+    let area: Vec<f64> = (0..mesh.elements()).map(|e| mesh.area(e)).collect();
+    let power = |e: usize| {
+        let own = &light.solution.irradiance[e * nodes..(e + 1) * nodes];
+        area[e] * own.iter().map(|h| h.max_element()).sum::<f64>().max(0.0)
+    };
+    let (surface, all): (f64, f64) = (area.iter().sum(), (0..area.len()).map(power).sum());
+    let share = |e: usize| 0.5 * area[e] / surface + 0.5 * power(e) / all;
+    let mut until: Vec<f64> = (0..area.len()).map(share).collect();
+    (1..until.len()).for_each(|e| until[e] += until[e - 1]);
+    let mut random = Random::new(seed);
+    let mut one = || {
+        let at = random.unit();
+        let e = until.partition_point(|&u| u <= at).min(until.len() - 1);
+        let t = &mesh.element_corners[e];
+        let (mut s, mut u) = (random.unit(), random.unit());
+        if s + u > 1.0 {
+            (s, u) = (1.0 - s, 1.0 - u);
+        }
+        let x = t[0] + s * (t[1] - t[0]) + u * (t[2] - t[0]);
+        (mesh.element_root[e], x, area[e] / surface / share(e))
+    };
+    (0..count).map(|_| one()).collect()
+}
+
 /// The error of a light at random points against one of a tolerance ten times smaller, and its
 /// estimate over that.
 fn error_and_honesty(scene: &Scene, tolerance: f64) -> (f64, f64) {
     let (light, reference) = (within(scene, tolerance), within(scene, 0.1 * tolerance));
-    let asked = points(&light.mesh, 1500, 7);
-    let error = difference(&gathered(&light, &asked), &gathered(&reference, &asked));
+    let at = weighed_points(&reference, 2000, 7);
+    let pairs: Vec<(DVec3, DVec3)> = at
+        .par_iter()
+        .map_init(Walker::default, |walker, &(root, x, _)| {
+            let root = &reference.mesh.roots[root as usize];
+            let frame = &reference.mesh.faces[root.face as usize].frame;
+            let mut at = |light: &Light| light.irradiance(walker, frame.lift(x), frame.n);
+            (at(&light), at(&reference))
+        })
+        .collect();
+    let weights: f64 = at.iter().map(|p| p.2).sum();
+    let mean = pairs.iter().zip(&at).map(|(h, p)| p.2 * h.1).sum::<DVec3>() / weights;
+    let squares: DVec3 = pairs.iter().zip(&at).map(|(h, p)| p.2 * (h.0 - h.1) * (h.0 - h.1)).sum();
+    let error = (squares / weights / (mean * mean)).max_element().sqrt();
     (error, light.apart().unwrap().estimate.rms / error)
 }
 
