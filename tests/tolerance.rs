@@ -97,11 +97,19 @@ fn weighed_points(light: &Light, count: usize, seed: u64) -> Vec<(u32, DVec2, f6
     (0..count).map(|_| one()).collect()
 }
 
+/// Random points, evenly by area, likewise.
+fn even_points(light: &Light, count: usize, seed: u64) -> Vec<(u32, DVec2, f64)> {
+    let asked = points(&light.mesh, count, seed);
+    asked.iter().flat_map(|own| own.points.iter().map(|&x| (own.root, x, 1.0))).collect()
+}
+
+type Points = fn(&Light, usize, u64) -> Vec<(u32, DVec2, f64)>;
+
 /// The error of a light at random points against one of a tolerance ten times smaller, and its
 /// estimate over that.
-fn error_and_honesty(scene: &Scene, tolerance: f64) -> (f64, f64) {
+fn error_and_honesty(scene: &Scene, tolerance: f64, points: Points) -> (f64, f64) {
     let (light, reference) = (within(scene, tolerance), within(scene, 0.1 * tolerance));
-    let at = weighed_points(&reference, 2000, 7);
+    let at = points(&reference, 1500, 7);
     let pairs: Vec<(DVec3, DVec3)> = at
         .par_iter()
         .map_init(Walker::default, |walker, &(root, x, _)| {
@@ -119,15 +127,19 @@ fn error_and_honesty(scene: &Scene, tolerance: f64) -> (f64, f64) {
 }
 
 /// Of seeded rooms nearly all meet their tolerance, and of nearly all the estimates are above their
-/// errors, which is to say above `least` times them.
-fn all_meet(room: fn(u64) -> Scene, seeds: std::ops::Range<u64>, tolerance: f64, least: f64) {
+/// errors.
+fn all_meet(
+    (room, points): (fn(u64) -> Scene, Points),
+    seeds: std::ops::Range<u64>,
+    tolerance: f64,
+) {
     let (mut met, mut honest) = (0, 0);
     let count = seeds.end - seeds.start;
     for seed in seeds {
-        let (error, honesty) = error_and_honesty(&room(seed), tolerance);
+        let (error, honesty) = error_and_honesty(&room(seed), tolerance, points);
         println!("room {seed}: error {error:.2e}, estimate over it {honesty:.2}");
         met += u64::from(error <= tolerance);
-        honest += u64::from(honesty >= least);
+        honest += u64::from(honesty >= 1.0);
     }
     println!("{met} of {count} met, {honest} honest");
     assert!(20 * met >= 19 * count && 20 * honest >= 19 * count, "{met} {honest} of {count}");
@@ -135,27 +147,26 @@ fn all_meet(room: fn(u64) -> Scene, seeds: std::ops::Range<u64>, tolerance: f64,
 
 #[test]
 fn a_few_random_rooms_meet_their_tolerance() {
-    all_meet(furnished, 0..4, 2e-2, 1.0);
+    all_meet((furnished, even_points), 0..4, 2e-2);
 }
 
 /// Takes about half an hour of one processor.
 #[test]
 #[ignore = "a study: cargo test --release --test tolerance -- --ignored --nocapture"]
 fn a_hundred_random_rooms_meet_their_tolerance() {
-    all_meet(furnished, 0..100, 3e-2, 1.0);
+    all_meet((furnished, even_points), 0..100, 3e-2);
 }
 
-/// Nearly all of two is both: hence the margin (one estimate is 0.97 of its error).
 #[test]
 fn a_few_rooms_with_small_lamps_close_to_walls_meet_their_tolerance() {
-    all_meet(with_spots, 0..2, 3e-2, 0.9);
+    all_meet((with_spots, weighed_points), 0..2, 3e-2);
 }
 
-/// Likewise.
+/// What is missed beside edges that spots light is not seen by estimates until elements are as small.
 #[test]
-#[ignore = "a study: cargo test --release --test tolerance -- --ignored --nocapture"]
+#[ignore = "a study, known to fail: one estimate in eight is too low"]
 fn fifty_rooms_with_small_lamps_close_to_walls_meet_their_tolerance() {
-    all_meet(with_spots, 0..50, 6e-2, 1.0);
+    all_meet((with_spots, weighed_points), 0..50, 6e-2);
 }
 
 fn room_with_lamp(lamp: Vec<([DVec3; 4], u32)>, change: impl Fn(&mut Scene)) -> Scene {
