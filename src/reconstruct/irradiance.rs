@@ -190,7 +190,7 @@ pub fn changes(light: &Light, asked: &[RootPoints], monitor: &Monitor) -> Result
     let Some(source) = light.apart() else { return Ok(zero()) };
     let Some(coarser) = &source.coarser else { return Ok(zero()) };
     if let (Some(mut by_rays), Reflected::Rays(before)) = (ByRays::of(light), coarser) {
-        (by_rays.sources.before, by_rays.sources.emitted) = (Some(before), None);
+        (by_rays.sources.before, by_rays.sources.emitted) = (Some(before.as_ref()), None);
         let change = |found: Estimated| Estimated::exactly(found.change.abs());
         return Ok(by_rays.gather(light, asked, change, monitor)?.0);
     }

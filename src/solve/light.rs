@@ -80,7 +80,7 @@ pub enum Reflected {
     /// By cells, with exact visibility.
     Cells(Radiant),
     /// By bundles of rays.
-    Rays(RayRadiant),
+    Rays(Box<RayRadiant>),
 }
 
 /// What gathering by rays needs.

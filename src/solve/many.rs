@@ -197,8 +197,8 @@ pub fn light_of_many(
     let counts = vec![("patches", step.radiant.patches.len() as u64)];
     let source = ApartSource {
         emitters,
-        reflected: Reflected::Rays(step.radiant),
-        coarser: coarser.map(Reflected::Rays),
+        reflected: Reflected::Rays(Box::new(step.radiant)),
+        coarser: coarser.map(|coarser| Reflected::Rays(Box::new(coarser))),
         rays: Some(rays),
         allowed,
         allowed_direct: share::EMITTER * unit,
