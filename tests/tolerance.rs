@@ -39,14 +39,18 @@ fn points(mesh: &Mesh, count: usize, seed: u64) -> Vec<RootPoints> {
             left < 0.0
         });
         let number = number.unwrap_or(0);
-        let t = &mesh.roots[number].corners;
-        let (mut s, mut u) = (random.unit(), random.unit());
-        if s + u > 1.0 {
-            (s, u) = (1.0 - s, 1.0 - u);
-        }
-        asked[number].points.push(t[0] + s * (t[1] - t[0]) + u * (t[2] - t[0]));
+        asked[number].points.push(in_triangle(&mesh.roots[number].corners, &mut random));
     }
     asked
+}
+
+/// A random point of a triangle, evenly by area.
+fn in_triangle(t: &[DVec2; 3], random: &mut Random) -> DVec2 {
+    let (mut s, mut u) = (random.unit(), random.unit());
+    if s + u > 1.0 {
+        (s, u) = (1.0 - s, 1.0 - u);
+    }
+    t[0] + s * (t[1] - t[0]) + u * (t[2] - t[0])
 }
 
 /// Irradiance gathered at each point.
@@ -86,12 +90,7 @@ fn weighed_points(light: &Light, count: usize, seed: u64) -> Vec<(u32, DVec2, f6
     let mut one = || {
         let at = random.unit();
         let e = until.partition_point(|&u| u <= at).min(until.len() - 1);
-        let t = &mesh.element_corners[e];
-        let (mut s, mut u) = (random.unit(), random.unit());
-        if s + u > 1.0 {
-            (s, u) = (1.0 - s, 1.0 - u);
-        }
-        let x = t[0] + s * (t[1] - t[0]) + u * (t[2] - t[0]);
+        let x = in_triangle(&mesh.element_corners[e], &mut random);
         (mesh.element_root[e], x, area[e] / surface / share(e))
     };
     (0..count).map(|_| one()).collect()

@@ -21,6 +21,7 @@ use super::bundles::RayScene;
 use super::hemisphere::{flips_for, in_square};
 use super::lamps::Place;
 use super::patches::Patches;
+use super::spread::{Shares, on_triangle};
 use super::walk::Walker;
 use crate::geometry::polygon::twice_area;
 use crate::mesh::Mesh;
@@ -30,8 +31,7 @@ use crate::scene::Scene;
 #[derive(Clone, Default)]
 pub struct Bright {
     pieces: Vec<Piece>,
-    /// Power of all pieces up to and with each, as a share of the whole.
-    until: Vec<f64>,
+    shares: Shares,
     /// Of each cell the density of points there, 1/m^2; empty where no cell is bright.
     density: Vec<f64>,
 }
@@ -77,7 +77,7 @@ impl Bright {
             return Bright::default();
         };
         let mut bright = Bright { density: vec![0.0; cells], ..Bright::default() };
-        let mut sum = 0.0;
+        let mut powers = vec![];
         for patch in 0..patches.len() {
             if !patches.cells(patch).any(|cell| radiates(cell) >= least) {
                 continue;
@@ -89,15 +89,14 @@ impl Bright {
                 bright.density[cell] = radiates(cell);
                 for k in 1..polygon.len() - 1 {
                     let corners = [polygon[0], polygon[k], polygon[k + 1]];
-                    sum += radiates(cell) * 0.5 * twice_area(&corners);
-                    bright.until.push(sum);
+                    powers.push(radiates(cell) * 0.5 * twice_area(&corners));
                     bright.pieces.push(Piece { cell: cell as u32, face, corners });
                 }
             }
         }
-        bright.until.iter_mut().for_each(|u| *u /= sum);
+        let (shares, sum) = Shares::of(powers);
         bright.density.iter_mut().for_each(|d| *d /= sum);
-        bright
+        Bright { shares, ..bright }
     }
 
     /// Whether there are none.
@@ -114,10 +113,7 @@ impl Bright {
     /// is `cosines`, where one point goes with each ray.
     pub fn weight_of_ray(&self, cell: usize, square: f64, cosines: f64) -> f64 {
         match self.density.get(cell) {
-            Some(&density) if density > 0.0 => {
-                let of_rays = cosines / (PI * square);
-                of_rays / (of_rays + density)
-            }
+            Some(&density) if density > 0.0 => balanced(cosines / (PI * square), density),
             _ => 1.0,
         }
     }
@@ -136,12 +132,10 @@ impl Bright {
         k: u32,
     ) -> Option<Point> {
         let Place { point, normal, flips } = place;
-        let at = in_square(k, flips_for(flips, OF_FLIPS));
-        let number = self.until.partition_point(|&u| u <= at.x).min(self.pieces.len() - 1);
+        let (number, at) = self.shares.choose(in_square(k, flips_for(flips, OF_FLIPS)));
         let Piece { cell, face, corners: [a, b, c] } = self.pieces[number];
-        let begin = if number == 0 { 0.0 } else { self.until[number - 1] };
-        let share = ((at.x - begin) / (self.until[number] - begin)).clamp(0.0, 1.0).sqrt();
-        let x = a + share * ((1.0 - at.y) * (b - a) + at.y * (c - a));
+        let w = on_triangle(at);
+        let x = w.x * a + w.y * b + w.z * c;
         let frame = &mesh.faces[face as usize].frame;
         let to = frame.lift(x);
         let between = to - point;
@@ -151,9 +145,14 @@ impl Bright {
             return None;
         }
         let of_rays = here * there / (PI * square * square);
-        let weight = of_rays / (of_rays + self.density[cell as usize]);
+        let weight = balanced(of_rays, self.density[cell as usize]);
         Some(Point { face, x, square, cosine: there / square.sqrt(), weight })
     }
+}
+
+/// What a sample counts that rays and points find with such densities: the balance heuristic.
+fn balanced(of_rays: f64, of_points: f64) -> f64 {
+    of_rays / (of_rays + of_points)
 }
 
 /// The least radiosity that is bright, where points are worth their time.

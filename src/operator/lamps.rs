@@ -21,6 +21,7 @@ use glam::{DVec2, DVec3};
 
 use super::bundles::RayScene;
 use super::hemisphere::{flips, in_square};
+use super::spread::{Shares, on_triangle};
 use super::walk::Walker;
 use crate::geometry::polygon::Linear;
 use crate::geometry::{COINCIDENCE, Frame, Pieces, triangle_area};
@@ -35,8 +36,7 @@ pub struct Lamps {
     planes: Vec<Plane>,
     /// Of each face of the mesh its lamp.
     of_face: Vec<Option<u32>>,
-    /// Power of all lamps up to and with each, as a share of the whole.
-    until: Vec<f64>,
+    shares: Shares,
     /// One over the power of all, 1/W.
     density: f64,
     /// Whether no texture varies what a face emits.
@@ -110,7 +110,7 @@ struct Plane {
 impl Lamps {
     /// All faces of a mesh that emit; textures are averaged over each.
     pub fn new(scene: &Scene, mesh: &Mesh) -> Lamps {
-        let (mut lamps, mut until, mut sum) = (vec![], vec![], 0.0);
+        let (mut lamps, mut powers) = (vec![], vec![]);
         let (mut of_face, mut even) = (vec![], true);
         for face in &mesh.faces {
             let whole = face.corners.map(|x| face.triangle_weights(x));
@@ -120,17 +120,16 @@ impl Lamps {
             if power > 0.0 {
                 let material = scene.triangles[face.triangle as usize].material as usize;
                 even &= scene.materials[material].radiance_texture.is_none();
-                sum += power;
-                until.push(sum);
+                powers.push(power);
                 let corners = face.corners.map(|x| face.frame.lift(x));
                 let (frame, flat) = (face.frame, face.corners);
                 lamps.push(Lamp { corners, frame, flat, exitance: e });
             }
         }
-        until.iter_mut().for_each(|u| *u /= sum);
+        let (shares, sum) = Shares::of(powers);
         let magnitude = mesh.magnitude;
         let planes = if lamps.len() <= FEW { planes(&lamps, magnitude) } else { vec![] };
-        Lamps { lamps, planes, of_face, until, density: 1.0 / sum, even, magnitude }
+        Lamps { lamps, planes, of_face, shares, density: 1.0 / sum, even, magnitude }
     }
 
     /// Whether each face emits evenly: otherwise what samples find is a mean over it.
@@ -222,12 +221,10 @@ impl Lamps {
         }
         let mut sum = Lit::default();
         for k in rays.in_order(first, count) {
-            let x = in_square(k, flips);
-            let place = self.until.partition_point(|&u| u <= x.x).min(self.lamps.len() - 1);
-            let lamp = &self.lamps[place];
-            let begin = if place == 0 { 0.0 } else { self.until[place - 1] };
-            let along = ((x.x - begin) / (self.until[place] - begin)).clamp(0.0, 1.0);
-            let at = on_triangle(&lamp.corners, DVec2::new(along, x.y));
+            let (number, x) = self.shares.choose(in_square(k, flips));
+            let lamp = &self.lamps[number];
+            let w = on_triangle(x);
+            let at = w.x * lamp.corners[0] + w.y * lamp.corners[1] + w.z * lamp.corners[2];
             let between = at - point;
             let square = between.length_squared();
             let cosines = between.dot(normal) * -between.dot(lamp.frame.n);
@@ -266,10 +263,4 @@ fn planes(lamps: &[Lamp], magnitude: f64) -> Vec<Plane> {
         own.lamps.push((number as u32, sides));
     }
     planes
-}
-
-/// The point of a triangle that belongs to a point of the unit square, evenly by area.
-fn on_triangle([a, b, c]: &[DVec3; 3], x: DVec2) -> DVec3 {
-    let root = x.x.sqrt();
-    *a + root * (1.0 - x.y) * (*b - *a) + root * x.y * (*c - *a)
 }

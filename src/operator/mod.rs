@@ -18,6 +18,7 @@ pub mod patches;
 pub mod ray_gather;
 pub mod reach;
 pub mod runs;
+pub mod spread;
 pub mod walk;
 
 use crate::cluster::fit::Deviation;

@@ -83,7 +83,8 @@ impl Apart {
         let (reflectance, _) = mesh::appearance(scene, &mesh);
         let coarse =
             coarser.map(|c| Coarse { mesh: &c.mesh, clusters: &c.clusters, solution: &c.solution });
-        let first = field.first_reflection(&mesh);
+        let once = field.reflected_once();
+        let first = field.at_nodes(&once, &mesh);
         let mut counts = vec![("cells of direct light", field.len() as u64)];
         let (solution, stored) = match (coarser, options.sweep) {
             (Some(coarser), Some(allowed)) => {
@@ -93,7 +94,9 @@ impl Apart {
                 (Solution { radiosity, irradiance: w, ..coarser.solution.clone() }, None)
             }
             _ => {
-                let missed = missed(&field, stage, options.fineness.deviation, monitor)?;
+                let least = options.fineness.deviation;
+                let missed = missed((&field, &once), stage, &reflectance, least, monitor)?;
+                drop(once);
                 let spots = missed.as_ref().map_or(&[][..], |missed| &missed.elements);
                 counts.push(("elements with spots", spots.len() as u64));
                 let mut sent = first;
@@ -105,7 +108,7 @@ impl Apart {
                 let how = FastSolve {
                     start: coarse.as_ref().map_or(Start::Unknown, Start::Coarse),
                     fast: options.fast,
-                    solve: options.solve.relative_to(options.mean, &sent),
+                    solve: options.solve.relative_to(options.mean, sent.iter().copied()),
                     max_memory: options.max_memory,
                 };
                 let solved = solve_fast(stage, &reflectance, &sent, &how, monitor)?;
@@ -145,7 +148,7 @@ impl Apart {
         };
         let stored = stored.or_else(|| coarser.map(|c| c.stored.clone())).unwrap_or_default();
         let reflected = Radiant::new(stage, field.reflected(&mesh, &solution.irradiance));
-        let direct = field.irradiance(&mesh);
+        let direct = field.at_nodes(&field.irradiance(), &mesh);
         Ok(Apart { reflected, solution, reflectance, direct, counts, stored, clusters, mesh })
     }
 

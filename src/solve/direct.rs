@@ -220,15 +220,9 @@ impl DirectField {
         self.tree.is_empty()
     }
 
-    /// rho H_d at the nodes of a mesh of the same roots that is no finer than the one this was made
-    /// for: best linear fits on the elements.
-    pub fn first_reflection(&self, mesh: &Mesh) -> Vec<DVec3> {
-        self.on_elements(mesh, |cell| times(&cell.irradiance, &cell.reflectance))
-    }
-
-    /// H_d at the nodes of a mesh, likewise.
-    pub fn irradiance(&self, mesh: &Mesh) -> Vec<DVec3> {
-        self.on_elements(mesh, |cell| cell.irradiance)
+    /// H_d on the tree.
+    pub fn irradiance(&self) -> Field {
+        self.field(|cell| cell.irradiance)
     }
 
     /// rho H_d on the tree.
@@ -240,8 +234,9 @@ impl DirectField {
         Field::new(self.tree.clone(), self.cells.iter().map(of_leaf).collect())
     }
 
-    fn on_elements(&self, mesh: &Mesh, of_leaf: impl Fn(&DirectCell) -> Fit<3>) -> Vec<DVec3> {
-        let field = self.field(of_leaf);
+    /// A field on this tree at the nodes of a mesh of the same roots that is no finer than the one this
+    /// was made for: best linear fits on the elements.
+    pub fn at_nodes(&self, field: &Field, mesh: &Mesh) -> Vec<DVec3> {
         let mut nodes = vec![DVec3::ZERO; mesh.nodes()];
         self.for_elements(mesh, |element, cell| {
             for (j, value) in field.fits[cell as usize].iter().enumerate() {
@@ -252,7 +247,7 @@ impl DirectField {
     }
 
     /// The reflected radiosity rho (H_d + w), with indirect irradiance `w` at the nodes of a mesh as
-    /// in [`DirectField::first_reflection`].
+    /// in [`DirectField::at_nodes`].
     pub fn reflected(&self, mesh: &Mesh, w: &[DVec3]) -> Field {
         let mut values = vec![[[0.0; 3]; 3]; self.tree.len()];
         let mut stack: Vec<(u32, Fit<3>)> = vec![];

@@ -375,8 +375,7 @@ impl Ladder<'_> {
         };
         let residual = (share::RESIDUAL * tolerance).clamp(LEAST_RESIDUAL, 1e-3);
         let how = SolveOptions { residual, ..SolveOptions::default() };
-        let sent: Vec<DVec3> = begin.iter().map(|b| DVec3::from_array(*b)).collect();
-        let how = how.relative_to(self.emitted, &sent);
+        let how = how.relative_to(self.emitted, begin.iter().map(|b| DVec3::from_array(*b)));
         let (u, residual, iterations) = gmres(&apply, &begin, None, &how, self.monitor)?;
         // What is not a number has not converged either.
         if !residual.iter().all(|&r| r <= how.residual) {

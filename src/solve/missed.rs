@@ -31,21 +31,25 @@ pub struct Missed {
     pub elements: Vec<usize>,
 }
 
-/// What the elements of the stage's mesh miss of directly reflected light; nothing where they miss
-/// little.
+/// What the elements of the stage's mesh miss of directly reflected light (`once`, rho H_d on the tree of
+/// `direct`); nothing where they miss little, and at nodes without `reflectance`.
 ///
 /// An element misses much if what it misses (root mean square times area) is more than `least` times the
 /// whole surface, in W/m^2. A cell of those may make an error of `least` at a node.
 pub fn missed(
-    direct: &DirectField,
+    (direct, once): (&DirectField, &Field),
     stage: Stage,
+    reflectance: &[DVec3],
     least: f64,
     monitor: &Monitor,
 ) -> Result<Option<Missed>> {
-    let Some((field, elements)) = rough(direct, stage.mesh, least) else { return Ok(None) };
+    let Some((field, elements)) = rough(direct, once, stage.mesh, least) else { return Ok(None) };
     let radiant = Radiant::new(stage, field);
-    let nodes = 0..stage.mesh.nodes();
-    let found = nodes.into_par_iter().map_init(Walker::default, |walker, node| {
+    let nodes = reflectance.par_iter().enumerate();
+    let found = nodes.map_init(Walker::default, |walker, (node, rho)| {
+        if *rho == DVec3::ZERO {
+            return Ok(DVec3::ZERO);
+        }
         monitor.check()?;
         let (point, normal) = stage.mesh.node(node);
         Ok(radiant.gather(walker, stage, point, normal, least))
@@ -55,8 +59,12 @@ pub fn missed(
 
 /// Directly reflected light minus its fits on the elements that miss much, and zero elsewhere; with
 /// those elements.
-fn rough(direct: &DirectField, mesh: &Mesh, least: f64) -> Option<(Field, Vec<usize>)> {
-    let whole = direct.reflected_once();
+fn rough(
+    direct: &DirectField,
+    whole: &Field,
+    mesh: &Mesh,
+    least: f64,
+) -> Option<(Field, Vec<usize>)> {
     let most = least * surface_area(mesh);
     let mut values = vec![[[0.0; 3]; 3]; direct.len()];
     let (mut cells, mut elements): (Vec<u32>, Vec<usize>) = (vec![], vec![]);
@@ -83,7 +91,7 @@ fn rough(direct: &DirectField, mesh: &Mesh, least: f64) -> Option<(Field, Vec<us
     if cells.is_empty() {
         return None;
     }
-    let mut field = Field::new(whole.tree, values);
+    let mut field = Field::new(whole.tree.clone(), values);
     // But for rounding they are zero, and need not be looked at.
     for cell in cells {
         field.fits[cell as usize] = [[0.0; 3]; 3];

@@ -42,9 +42,14 @@ impl Default for SolveOptions {
 impl SolveOptions {
     /// The same for light of about `mean` at most places, W/m^2: where a few nodes `sent` much more,
     /// residuals relative to that would leave all the others unsolved.
-    pub fn relative_to(self, mean: DVec3, sent: &[DVec3]) -> SolveOptions {
-        let squares: DVec3 = sent.iter().map(|b| *b * *b).sum();
-        let rms = (squares / sent.len().max(1) as f64).map(f64::sqrt);
+    pub fn relative_to(
+        self,
+        mean: DVec3,
+        sent: impl ExactSizeIterator<Item = DVec3>,
+    ) -> SolveOptions {
+        let nodes = sent.len().max(1) as f64;
+        let squares: DVec3 = sent.map(|b| b * b).sum();
+        let rms = (squares / nodes).map(f64::sqrt);
         let share = DVec3::select(rms.cmpgt(mean), mean / rms, DVec3::ONE);
         let shares = share.to_array().into_iter().filter(|share| *share > 0.0);
         let residual = self.residual * shares.fold(1.0, f64::min);
