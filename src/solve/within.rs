@@ -132,8 +132,9 @@ pub struct Estimate {
 /// Error of the finest solution over its difference from the one before, of solutions that changed
 /// so much from step to step: 1/(r - 1) with a margin, where each step divides errors by r. One
 /// change alone does not tell r: then the coarser solution was from the coarsest mesh, and worse
-/// than it has to be.
-pub(super) fn of_change(changes: &[f64]) -> f64 {
+/// than it has to be. The last change tells too little where the coarser solution was also `rougher` in
+/// its operator and the rest: but four times the elements halve what is left.
+fn of_change(changes: &[f64], rougher: bool) -> f64 {
     const MARGIN: f64 = 1.3;
     /// Never less, however fast errors seem to fall: along rims they fall slowly, and are last to go.
     /// Never more, since steps with four times the elements do divide them.
@@ -145,7 +146,8 @@ pub(super) fn of_change(changes: &[f64]) -> f64 {
         }
         _ => return FIRST,
     };
-    (MARGIN / (reduction.max(1.0) - 1.0)).clamp(BELIEVED.0, BELIEVED.1)
+    let least = if rougher { 2.0 } else { 1.0 };
+    (MARGIN / (reduction.max(least) - 1.0)).clamp(BELIEVED.0, BELIEVED.1)
 }
 
 /// Error over the first change, away from the edges of roots and beside them, where light is singular
@@ -401,7 +403,7 @@ impl Ladder<'_> {
                     local.iter().zip(samples).map(|(x, s)| share(s) * *x).collect();
                 rms(&errors, samples) / change
             }
-            changes => of_change(changes),
+            changes => of_change(changes, before.is_some_and(|b| b.tolerance > tolerance)),
         };
         // A spot of light may lie between all nodes of the first meshes.
         let dark_for_good = !self.arrives || step >= DARK_FOR_GOOD;
