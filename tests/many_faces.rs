@@ -60,7 +60,8 @@ fn rays_agree_with_exact_visibility() {
         let (exact, rays) = (within(&room, 3e-3), within(&fine, 1e-2));
         assert!(!is_by_rays(&exact) && is_by_rays(&rays));
         let (want, got) = (at_triangles(&exact, &fine, 13), at_triangles(&rays, &fine, 13));
-        let mean = rays.apart().unwrap().estimate.mean;
+        let source = rays.apart().unwrap();
+        let mean = source.estimate.mean;
         // By area: small things have as many triangles as walls.
         let weights: Vec<f64> =
             fine.triangles.iter().step_by(13).map(|t| t.normal_and_area().1).collect();
@@ -68,7 +69,9 @@ fn rays_agree_with_exact_visibility() {
         let squares: DVec3 = (0..want.len())
             .map(|i| weights[i] / total * ((got[i] - want[i]) / mean).powf(2.0))
             .sum();
-        let (error, estimate) = (squares.max_element().sqrt(), rays.apart().unwrap().estimate.rms);
+        // Solution and gathering.
+        let estimate = source.estimate.rms.hypot(source.allowed / mean.max_element());
+        let error = squares.max_element().sqrt();
         println!("room {seed}: {} points, error {error:.2e}, estimate {estimate:.2e}", want.len());
         // Both are sums over few points.
         assert!(error <= 1e-2 && 1.5 * estimate >= error, "{error:e} {estimate:e}");
@@ -172,11 +175,12 @@ fn a_lamp_close_to_a_wall_lights_the_room_by_a_few_bright_cells() {
     let fine = cut(&room, 3);
     let (exact, rays) = (within(&room, 3e-3), within(&fine, 1e-2));
     assert!(!is_by_rays(&exact) && is_by_rays(&rays));
-    let Reflected::Rays(radiant) = &rays.apart().unwrap().reflected else { unreachable!() };
+    let source = rays.apart().unwrap();
+    let Reflected::Rays(radiant) = &source.reflected else { unreachable!() };
     assert!(!radiant.bright.is_empty());
     let (want, got) = (at_triangles(&exact, &fine, 13), at_triangles(&rays, &fine, 13));
-    let (mean, estimate) =
-        (rays.apart().unwrap().estimate.mean.x, rays.apart().unwrap().estimate.rms);
+    let mean = source.estimate.mean.x;
+    let estimate = source.estimate.rms.hypot(source.allowed / mean);
     // On what reflects: the lamp itself sees the spot, a thousand times as bright as the mean.
     let area = |t: &Triangle| if t.material == material { 0.0 } else { t.normal_and_area().1 };
     let weights: Vec<f64> = fine.triangles.iter().step_by(13).map(area).collect();

@@ -70,11 +70,9 @@ fn main() -> Result<()> {
     let found: Vec<DVec3> = found.into_iter().flatten().collect();
     println!("off from the same solution gathered better: {:.2e}", off(&found, &own));
     let finer = within(&scene, 0.25 * tolerance)?;
-    println!(
-        "off from a solution for {}: {:.2e}",
-        0.25 * tolerance,
-        off(&found, &reference(&finer, &asked))
-    );
+    let right = reference(&finer, &asked);
+    println!("off from a solution for {}: {:.2e}", 0.25 * tolerance, off(&found, &right));
+    println!("of that the solution: {:.2e}", off(&own, &right));
     Ok(())
 }
 

@@ -13,6 +13,7 @@
 //! Lamps are left to exact gathering. Directions depend on the point alone ([`super::hemisphere`]),
 //! so that all channels and all solutions meet the same faces, and so does every run.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -140,7 +141,7 @@ impl Rows {
     ///
     /// [`Error::Memory`] above `max_memory` bytes; those of the monitor.
     pub fn cast(
-        scene: &RayScene,
+        scene: (&RayScene, &Scene),
         mesh: &Mesh,
         patches: &mut Patches,
         before: Option<&RayRadiant>,
@@ -183,7 +184,7 @@ impl Rows {
         }
         let lost = rows.lost(patches);
         if lost.contains(&true) {
-            let moved = rows.put_where_seen(scene, mesh, patches, samples, &lost);
+            let moved = rows.put_where_seen(scene.0, mesh, patches, samples, &lost);
             let again: Vec<(usize, Option<Row>)> = moved
                 .into_par_iter()
                 .map_init(Walker::default, |walker, cell| {
@@ -328,9 +329,10 @@ impl Rows {
 /// Cells whose rays are cast before memory is looked at.
 const BLOCK: usize = 16_384;
 
-/// Bright cells, of which there are few, look at so many times as many rays and points: what they are
-/// off by counts for much.
-const OF_BRIGHT: u32 = 8;
+/// Where there are bright cells, these and those of more power than the mean look at more rays and points,
+/// from as many more spots: what they are off by counts for much, close by or everywhere.
+const OF_BRIGHT: f64 = 8.0;
+const MOST_TIMES: f64 = 64.0;
 
 /// Rays from a spot, at least.
 const FROM_EACH: u32 = 4;
@@ -345,7 +347,7 @@ fn cast_from(
     walker: &mut Walker,
     mut with: impl FnMut(usize, DVec3, Met),
 ) {
-    let count = (samples.rays / FROM_EACH).clamp(1, SPOTS as u32);
+    let count = (samples.rays / FROM_EACH).clamp(1, spots.len() as u32);
     let each = samples.rays / count;
     let mut own = None;
     for number in 0..count {
@@ -381,7 +383,7 @@ struct Seen {
 
 /// The row of a cell; none where all its spots are buried.
 fn row(
-    scene: &RayScene,
+    scene: (&RayScene, &Scene),
     mesh: &Mesh,
     patches: &Patches,
     before: Option<&RayRadiant>,
@@ -389,14 +391,20 @@ fn row(
     walker: &mut Walker,
     cell: usize,
 ) -> Option<Row> {
-    let spots = patches.spots(cell);
-    let more = match before {
-        Some(known) if known.is_bright(spots[0].face, spots[0].x) => OF_BRIGHT,
-        _ => 1,
-    };
-    let samples = Samples { points: more * samples.points, rays: more * samples.rays };
+    let (mut spots, mut samples) = (Cow::Borrowed(patches.spots(cell)), samples);
+    let times = before.map_or(1.0, |known| {
+        let Spot { face, x } = spots[0];
+        let least = if known.is_bright(face, x) { OF_BRIGHT } else { 1.0 };
+        known.power_at(face, x, patches.area[cell]).clamp(least, MOST_TIMES)
+    });
+    if times >= 2.0 {
+        let times = 1 << times.log2() as u32;
+        spots = Cow::Owned(patches.more_spots(scene.1, mesh, cell, times as usize));
+        samples = Samples { points: times * samples.points, rays: times * samples.rays };
+    }
+    let scene = scene.0;
     let mut seen = vec![];
-    cast_from(scene, mesh, spots, samples, walker, |number, towards, met| {
+    cast_from(scene, mesh, &spots, samples, walker, |number, towards, met| {
         seen.resize(number + 1, Seen::default());
         let own = &mut seen[number];
         own.rays += 1;

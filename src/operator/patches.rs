@@ -7,7 +7,7 @@
 //! coarsely as the sum over a hemisphere allows. Each cell has [`SPOTS`] points where light is gathered for
 //! it; how cells of one patch differ tells whether it is to be split.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -56,6 +56,8 @@ pub struct Patches {
     ends: Vec<usize>,
     /// The spots of each cell, [`SPOTS`] of them.
     spots: Vec<Spot>,
+    /// Patches whose spots were put elsewhere.
+    moved: HashSet<usize>,
     /// Area of each cell, square metres.
     pub area: Vec<f64>,
     /// Mean exitance E of each, W/m^2.
@@ -163,7 +165,8 @@ impl Patches {
         };
         cut.extend(cubes.into_iter().map(cube));
         patches.found = vec![UNKNOWN; cut.len()];
-        patches.add(scene, mesh, cut);
+        let new = vec![true; cut.len()];
+        patches.add(scene, mesh, cut, &new);
         Ok(patches)
     }
 
@@ -176,7 +179,7 @@ impl Patches {
         }
         let round = self.round + 1;
         let mut patches = Patches { grids, squares, round, ..Patches::default() };
-        let mut cut = vec![];
+        let (mut cut, mut new) = (vec![], vec![]);
         for (number, shape) in self.shapes.iter().enumerate() {
             match shape {
                 Shape::Square { face, low, side, place }
@@ -197,10 +200,10 @@ impl Patches {
                 }
                 _ => cut.push(shape.clone()),
             }
-            let whole = cut.len() == patches.found.len() + 1;
-            patches.found.resize(cut.len(), if whole { self.found[number] } else { UNKNOWN });
+            patches.found.resize(cut.len(), self.found[number]);
+            new.resize(cut.len(), cut.len() > new.len() + 1);
         }
-        patches.add(scene, mesh, cut);
+        patches.add(scene, mesh, cut, &new);
         patches
     }
 
@@ -223,20 +226,21 @@ impl Patches {
         first
     }
 
-    /// Adds patches of the given shapes, but for empty ones.
-    fn add(&mut self, scene: &Scene, mesh: &Mesh, shapes: Vec<Shape>) {
+    /// Adds patches of the given shapes, but for empty ones. Of those that are `new`, cells will tell how
+    /// light varies; a single one cannot, and keeps what was found in the patch that it was a part of.
+    fn add(&mut self, scene: &Scene, mesh: &Mesh, shapes: Vec<Shape>, new: &[bool]) {
         let parts: Vec<Vec<Part>> =
             shapes.par_iter().map(|shape| parts(scene, mesh, shape)).collect();
         let found = std::mem::take(&mut self.found);
-        for ((shape, parts), found) in shapes.into_iter().zip(parts).zip(found) {
+        for (((shape, parts), found), &new) in shapes.into_iter().zip(parts).zip(found).zip(new) {
             if parts.is_empty() {
                 continue;
             }
-            self.found.push(found);
+            let first = self.area.len();
             if let Shape::Square { place, .. } = &shape {
-                let first = self.quarters(*place);
+                let square = self.quarters(*place);
                 for part in &parts {
-                    self.add_cell(std::slice::from_ref(part), &[first + part.quarter]);
+                    self.add_cell(std::slice::from_ref(part), &[square + part.quarter]);
                 }
             } else {
                 for own in in_quarters(&parts) {
@@ -245,6 +249,8 @@ impl Patches {
                     self.add_cell(own, &squares);
                 }
             }
+            let single = self.area.len() == first + 1;
+            self.found.push(if new && !single { UNKNOWN } else { found });
             self.ends.push(self.area.len());
             self.shapes.push(shape);
         }
@@ -257,19 +263,7 @@ impl Patches {
             parts.iter().map(|p| p.area * of(p)).sum::<DVec3>() / area
         };
         let cell = self.area.len() as u32;
-        let begin = self.round * SPOTS as u32;
-        for number in begin..begin + SPOTS as u32 {
-            let [s, t, which] = scattered(parts[0].centre, number);
-            let mut left = which * area;
-            let chosen = parts.iter().position(|part| {
-                let inside = left <= part.area;
-                left -= if inside { 0.0 } else { part.area };
-                inside
-            });
-            let part = &parts[chosen.unwrap_or(0)];
-            let x = inside(&part.polygon, [s, t, left.clamp(0.0, part.area)]);
-            self.spots.push(Spot { face: part.face, x });
-        }
+        self.spots.extend(spots(parts, self.round, SPOTS));
         self.exitance.push(mean(&|p| p.exitance));
         self.reflectance.push(mean(&|p| p.reflectance));
         self.area.push(area);
@@ -304,6 +298,21 @@ impl Patches {
         begin..self.ends[patch]
     }
 
+    /// More spots of a cell, so many times as many; its own where these were put elsewhere.
+    pub fn more_spots(&self, scene: &Scene, mesh: &Mesh, cell: usize, times: usize) -> Vec<Spot> {
+        let patch = self.ends.partition_point(|&end| end <= cell);
+        if self.moved.contains(&patch) {
+            return self.spots(cell).to_vec();
+        }
+        let parts = parts(scene, mesh, &self.shapes[patch]);
+        let own = cell - self.cells(patch).start;
+        let own = match &self.shapes[patch] {
+            Shape::Square { .. } => std::slice::from_ref(&parts[own]),
+            Shape::Cube { .. } => in_quarters(&parts)[own],
+        };
+        spots(own, self.round, times * SPOTS)
+    }
+
     /// What the cells of a patch are made of: convex polygons in the planes of faces, each with the
     /// numbers of its cell and its face.
     pub fn polygons(
@@ -326,6 +335,7 @@ impl Patches {
 
     /// Puts the spots of a patch at other points of it, one or more.
     pub fn put_spots(&mut self, patch: usize, at: &[Spot]) {
+        self.moved.insert(patch);
         let cells = self.cells(patch);
         for (k, spot) in self.spots[SPOTS * cells.start..SPOTS * cells.end].iter_mut().enumerate() {
             *spot = at[k % at.len()];
@@ -493,6 +503,25 @@ fn scattered(x: DVec2, number: u32) -> [f64; 3] {
         let own = (seed >> 11) as f64 / (1u64 << 53) as f64;
         (own + f64::from(number) / power).fract()
     })
+}
+
+/// So many spots of a cell of some parts, other ones in each round.
+fn spots(parts: &[Part], round: u32, count: usize) -> Vec<Spot> {
+    let area: f64 = parts.iter().map(|p| p.area).sum();
+    let begin = round * count as u32;
+    let spot = |number| {
+        let [s, t, which] = scattered(parts[0].centre, number);
+        let mut left = which * area;
+        let chosen = parts.iter().position(|part| {
+            let inside = left <= part.area;
+            left -= if inside { 0.0 } else { part.area };
+            inside
+        });
+        let part = &parts[chosen.unwrap_or(0)];
+        let x = inside(&part.polygon, [s, t, left.clamp(0.0, part.area)]);
+        Spot { face: part.face, x }
+    };
+    (begin..begin + count as u32).map(spot).collect()
 }
 
 /// The point of a convex polygon that two numbers from 0 to 1 and one from 0 to its area choose.

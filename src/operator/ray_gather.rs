@@ -34,6 +34,8 @@ pub struct RayRadiant {
     pub unevenness: Vec<f64>,
     /// Cells that points are spread over as well.
     pub bright: Bright,
+    /// Mean power of a cell, W.
+    mean_power: f64,
 }
 
 impl RayRadiant {
@@ -53,7 +55,9 @@ impl RayRadiant {
             })
             .collect();
         let bright = Bright::new(scene, mesh, &patches, &radiosity);
-        RayRadiant { radiosity, patches, unevenness, bright }
+        let powers = patches.area.iter().zip(&radiosity).map(|(area, u)| area * u.max_element());
+        let mean_power = powers.sum::<f64>() / radiosity.len().max(1) as f64;
+        RayRadiant { radiosity, patches, unevenness, bright, mean_power }
     }
 
     /// What a ray counts that met a point of a face from a distance `square` (squared) at cosines
@@ -68,6 +72,13 @@ impl RayRadiant {
     /// Whether the cell at a point of a face is bright.
     pub fn is_bright(&self, face: u32, x: DVec2) -> bool {
         self.bright.has(self.patches.at(face, x))
+    }
+
+    /// The power of an area (m^2) that radiates like the cell at a point of a face, in units of the mean
+    /// power of a cell.
+    pub fn power_at(&self, face: u32, x: DVec2, area: f64) -> f64 {
+        let power = area * self.radiosity[self.patches.at(face, x)].max_element();
+        if self.mean_power > 0.0 { power / self.mean_power } else { 0.0 }
     }
 
     /// Whether the mean of a cell will do for a ray that met it at a distance (squared) at a cosine,
@@ -122,6 +133,11 @@ impl Enough {
         Enough { spread, per_root: 0.0 }
     }
 
+    /// So much by the square root of the number of rays.
+    pub fn by_root(per_root: f64) -> Enough {
+        Enough { spread: 0.0, per_root }
+    }
+
     /// So many times as much.
     pub fn times(self, more: f64) -> Enough {
         Enough { spread: more * self.spread, per_root: more * self.per_root }
@@ -141,12 +157,19 @@ pub struct Estimated {
     pub spread: DVec3,
     /// What it is more than it would be with [`Sources::before`] by the same rays.
     pub change: DVec3,
+    /// How many rays there were; none where it is known.
+    pub rays: u32,
 }
 
 impl Estimated {
     /// Whether so many rays sufficed, or almost.
     pub fn is_within(&self, enough: Enough, rays: u32) -> bool {
         self.spread.max_element() <= OF_HALF * enough.after(rays)
+    }
+
+    /// The spread times the square root of the number of rays, W/m^2: about the same for any number.
+    pub fn roughness(&self) -> f64 {
+        self.spread.max_element() * f64::from(self.rays).sqrt()
     }
 
     /// Irradiance that is known.
@@ -269,7 +292,8 @@ impl Sources<'_> {
                 let spread = own.max(before.0 * (f64::from(before.1) / f64::from(rays)).sqrt());
                 if spread.max_element() <= enough.after(rays) || rays >= counts.most {
                     let change: DVec3 = sums.iter().map(|own| own.change).sum();
-                    return Estimated { irradiance, spread, change: change / f64::from(rays) };
+                    let change = change / f64::from(rays);
+                    return Estimated { irradiance, spread, change, rays };
                 }
                 before = (own, rays);
             }

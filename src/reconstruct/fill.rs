@@ -541,7 +541,7 @@ mod tests {
             let spread = DVec3::splat(1e-3);
             let gather = |_: &mut Walker, _: &(), (_, own): (u32, f64), x| {
                 let irradiance = smooth(x);
-                Estimated { irradiance, spread: own * spread, change: DVec3::ZERO }
+                Estimated { spread: own * spread, ..Estimated::exactly(irradiance) }
             };
             let monitor = Monitor::silent();
             fill(&asked, (1e-3, false), |_, _, _| (), gather, |_| usize::MAX, &monitor).unwrap().1

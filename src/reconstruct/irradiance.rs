@@ -100,7 +100,7 @@ pub struct Look {
     /// many times as large.
     pub brighter: f64,
     /// How far off points may be, W/m^2, for all errors together to be what they may: by the square root
-    /// of the number of rays ([`Enough::per_root`]); nothing where each point is to be as good.
+    /// of the number of rays ([`Enough::per_root`]); nothing where they are points of the surface as any.
     pub per_root: Option<f64>,
 }
 
@@ -255,16 +255,13 @@ impl<'a> ByRays<'a> {
         };
         let sources =
             Sources { emitted: Some(&rays.lamps), ..Sources::reflected(radiant, &rays.lamps) };
-        let (enough, checked) = (Enough::of(rays.allowed), CHECKED * rays.allowed);
+        let (enough, checked) = (Enough::by_root(rays.per_root), CHECKED * rays.allowed);
         Some(ByRays { source, rays, sources, enough, checked, slack: &[] })
     }
 
     fn shown(mut self, shown: &'a Shown) -> ByRays<'a> {
         let Look { brighter, per_root } = shown.look;
-        self.enough = match per_root {
-            Some(per_root) => Enough { spread: 0.0, per_root },
-            None => self.enough.times(brighter),
-        };
+        self.enough = per_root.map_or(self.enough, Enough::by_root);
         self.checked *= brighter;
         self.slack = &shown.slack;
         self
@@ -328,7 +325,7 @@ pub fn look(
     let wanted = OF_RAYS * brighter * few.rays.allowed;
     let mut per_root = wanted / f64::from(few.rays.counts.least).sqrt();
     for _ in 0..LOOKS {
-        few.enough = Enough { spread: 0.0, per_root };
+        few.enough = Enough::by_root(per_root);
         let (_, counts) = few.gather(light, asked, |e| e, monitor)?;
         let found = (few.largest(counts.squares) / counts.points.max(1) as f64).sqrt();
         // Squares of spreads are in proportion to it.

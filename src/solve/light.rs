@@ -95,8 +95,12 @@ pub struct RaySource {
     pub share: f64,
     /// What they are off by at the samples, root mean square, relative to the mean irradiance.
     pub error: f64,
-    /// What they may be off by at each of many points, W/m^2: what the solution left of the tolerance.
+    /// What they may be off by at many points, root mean square, W/m^2: what the solution left of the
+    /// tolerance.
     pub allowed: f64,
+    /// The same by the square root of their number ([`Enough::per_root`]), for points spread over all of the
+    /// surface.
+    pub per_root: f64,
 }
 
 /// A solution with direct light apart, made to a tolerance.

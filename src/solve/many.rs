@@ -3,9 +3,9 @@
 //! Emitted light is gathered exactly, or by rays where few of them tell enough. What is reflected
 //! is the radiosity of patches ([`crate::operator::patches`]), and irradiance from it a mean over
 //! bundles of rays ([`crate::operator::bundles`]): each face of such a scene fills little of any
-//! hemisphere. The error has two parts: that of the bundles, known from parts of them, and that of the
-//! patches, known from what changes when they are made smaller, and light is gathered at other
-//! points of them.
+//! hemisphere. The error of the solution is known from what changes when patches are made smaller, and light
+//! is gathered at other points of them. What bundles to the points that are asked for are off by comes to
+//! that: it is known from parts of them, and takes what is left of the tolerance.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -49,12 +49,13 @@ const POINTS_OF_LAMPS: f64 = 64.0;
 
 /// Rays that are cast first for a gathered point, and how many times as many at most.
 const FIRST_RAYS: f64 = 512.0;
-const MORE_RAYS: u32 = 32;
+const MORE_RAYS: u32 = 512;
 
-/// At samples where these leave more than so many times the tolerance, so many times as many: a few of
-/// them would be most of the estimate.
-const OF_SAMPLE: f64 = 2.0;
-const FOR_SAMPLES: u32 = 16;
+/// Of the tolerance, what rays make the samples be off by, root mean square. It is no part of the error
+/// of the solution: changes are looked at along the same rays. That is why some may be off by more, where it
+/// would take more than so many times the first rays.
+const AT_SAMPLES: f64 = 0.5;
+const MORE_AT_SAMPLES: u32 = 32;
 
 /// Of the tolerance, the estimated error of the solution: rays to the points that are asked for need the
 /// rest.
@@ -71,6 +72,11 @@ const OF_CHANGE: f64 = 1.5;
 
 /// Most steps of the ladder.
 const MOST_STEPS: u32 = 7;
+
+/// Where there was little to split, cells being no more than so many times as many, and yet more than this
+/// share of the estimated error is left, most of it is chance: then rows get twice the rays.
+const LITTLE: f64 = 1.1;
+const CHANCE: f64 = 0.8;
 
 /// Whether bundles of rays are the better way for so many roots.
 pub fn is_many(roots: usize, tolerance: f64) -> bool {
@@ -145,16 +151,17 @@ pub fn light_of_many(
         share: 0.0,
         error: 0.0,
         allowed: 0.0,
+        per_root: 0.0,
     };
     let lamps = &rays.lamps;
     let sources = Sources { reflected: None, before: None, emitted: Some(lamps), lamps };
-    let direct: Vec<DVec3> = at
+    let direct: Vec<Estimated> = at
         .par_iter()
         .map_init(Walker::default, |walker, s| {
             monitor.check()?;
             let (how, place) = ((&emitters, share::EMITTER * unit), Place::new(s.point, s.normal));
             let enough = Enough::of(share::GATHER * unit);
-            Ok(rays.gather(&sources, how, walker, stage, place, enough).irradiance)
+            Ok(rays.gather(&sources, how, walker, stage, place, enough))
         })
         .collect::<Result<_>>()?;
     let ladder = Ladder {
@@ -168,7 +175,7 @@ pub fn light_of_many(
         monitor,
     };
     let (reached, why) = ladder.climb()?;
-    let Reached { step, coarser, estimate, share: reflected, spread, .. } = reached;
+    let Reached { step, coarser, estimate, share: reflected, spread, roughness } = reached;
     (rays.share, rays.error) = (reflected, spread);
     let met = estimate.rms <= options.tolerance;
     let out_of_time = matches!(why, Some(Error::TimeLimit(_)));
@@ -176,6 +183,9 @@ pub fn light_of_many(
     let allowed = share::GATHER * unit;
     let solved = (estimate.rms / options.tolerance).min(1.0);
     rays.allowed = ((1.0 - solved * solved).sqrt() * unit).max(allowed);
+    let both = roughness.iter().zip(&direct).map(|(own, direct)| own.hypot(direct.roughness()));
+    let rough: f64 = both.zip(&at).map(|(s, at)| at.weight * s).sum();
+    rays.per_root = per_root(rays.allowed, rough);
     let (reflectance, exitance) = mesh::appearance(scene, &base);
     let irradiance: Vec<DVec3> = (0..base.nodes())
         .map(|node| {
@@ -226,7 +236,7 @@ pub fn light_of_many(
 
 fn ladder_counts(tolerance: f64) -> RayCounts {
     let least = rays(FIRST_RAYS, tolerance);
-    RayCounts { least, most: (least * MORE_RAYS).min(1 << 18) }
+    RayCounts { least, most: (least * MORE_RAYS).min(1 << 22) }
 }
 
 struct Ladder<'a> {
@@ -234,7 +244,7 @@ struct Ladder<'a> {
     stage: Stage<'a>,
     rays: &'a RaySource,
     samples: &'a [Sample],
-    direct: &'a [DVec3],
+    direct: &'a [Estimated],
     emitted: DVec3,
     options: &'a WithinOptions,
     monitor: &'a Monitor<'a>,
@@ -249,6 +259,25 @@ struct Reached {
     share: f64,
     /// What rays are off by at the samples.
     spread: f64,
+    /// How rough reflected light is at each of them, W/m^2 ([`Estimated::roughness`]).
+    roughness: Vec<f64>,
+}
+
+impl Reached {
+    /// Whether more rays from each cell are needed rather than more cells, as far as the step `before`
+    /// tells.
+    fn is_left_to_chance(&self, before: &Reached) -> bool {
+        let cells = |reached: &Reached| reached.step.irradiance.len() as f64;
+        let little = cells(self) <= LITTLE * cells(before);
+        little && self.estimate.rms > CHANCE * before.estimate.rms
+    }
+}
+
+/// What points may be off by, by the square root of the number of their rays, for a root mean square of
+/// `target`: with s/sqrt(n) from n rays it is sqrt(per_root s) where n is what that asks for. `rough` is the
+/// mean of s.
+fn per_root(target: f64, rough: f64) -> f64 {
+    if rough > 0.0 { target * target / rough } else { f64::INFINITY }
 }
 
 impl Ladder<'_> {
@@ -258,10 +287,14 @@ impl Ladder<'_> {
         for _ in 1..PREPARED {
             first = self.step(Some(&first), COARSE)?;
         }
-        let mut reached = self.look(0, Some(&first), None)?;
+        let mut reached = self.look((0, 1.0), Some(&first), None)?;
+        let mut share_of_rays = 1.0;
         for number in 1..MOST_STEPS {
-            match self.look(number, Some(&reached.step), Some(&reached)) {
+            match self.look((number, share_of_rays), Some(&reached.step), Some(&reached)) {
                 Ok(next) => {
+                    if next.is_left_to_chance(&reached) {
+                        share_of_rays *= 2.0;
+                    }
                     let before = std::mem::replace(&mut reached, next);
                     reached.coarser = Some(before.step.radiant);
                 }
@@ -278,44 +311,47 @@ impl Ladder<'_> {
     /// Solves with patches of one size, looks at the samples and estimates the error.
     fn look(
         &self,
-        number: u32,
+        (number, share_of_rays): (u32, f64),
         coarser: Option<&Step>,
         before: Option<&Reached>,
     ) -> Result<Reached> {
-        let step = self.step(coarser, 1.0)?;
+        let step = self.step(coarser, share_of_rays)?;
         let tolerance = self.options.tolerance;
         let mean = match before {
             Some(before) => before.estimate.mean,
             None => self.emitted,
         };
-        let enough = Enough::of(share::GATHER * tolerance * mean.max_element());
+        // Errors count by the weights of samples; the first look tells but how rough light is.
+        let enough: Vec<Enough> = match before {
+            Some(Reached { roughness, .. }) => {
+                let rough = |(s, r): (&Sample, &f64)| s.weight.sqrt() * r;
+                let all: f64 = self.samples.iter().zip(roughness).map(rough).sum();
+                let per_root = per_root(AT_SAMPLES * tolerance * mean.max_element(), all);
+                let each = |s: &Sample| Enough::by_root(per_root / s.weight.sqrt());
+                self.samples.iter().map(each).collect()
+            }
+            None => vec![Enough::of(f64::INFINITY); self.samples.len()],
+        };
         let mesh = self.stage.mesh;
         let sources = Sources {
             before: before.map(|b| &b.step.radiant),
             ..Sources::reflected(&step.radiant, &self.rays.lamps)
         };
+        let least = self.rays.counts.least;
+        let counts = RayCounts { least, most: least * MORE_AT_SAMPLES };
         let found: Vec<Estimated> = self
             .samples
             .par_iter()
-            .map_init(Walker::default, |walker, s| {
+            .zip(&enough)
+            .map_init(Walker::default, |walker, (s, enough)| {
                 self.monitor.check()?;
-                let place = Place::new(s.point, s.normal);
-                let scene = (&self.rays.scene, mesh);
-                let counts = self.rays.counts;
-                let found = sources.gather(walker, scene, place, enough, counts);
-                let tolerated = OF_SAMPLE * tolerance * mean.max_element();
-                if found.spread.max_element() <= tolerated {
-                    return Ok(found);
-                }
-                let per_root = tolerated / f64::from(counts.most).sqrt();
-                let counts = RayCounts { most: counts.most * FOR_SAMPLES, ..counts };
-                let enough = Enough { per_root, ..enough };
-                Ok(sources.gather(walker, scene, place, enough, counts))
+                let (place, scene) = (Place::new(s.point, s.normal), (&self.rays.scene, mesh));
+                Ok(sources.gather(walker, scene, place, *enough, counts))
             })
             .collect::<Result<_>>()?;
         let at_samples: Vec<DVec3> = found.iter().map(|e| e.irradiance).collect();
         let totals = at_samples.iter().zip(self.direct).zip(self.samples);
-        let mean: DVec3 = totals.map(|((w, d), s)| s.weight * (*w + *d)).sum();
+        let mean: DVec3 = totals.map(|((w, d), s)| s.weight * (*w + d.irradiance)).sum();
         if !mean.is_finite() {
             return Err(Error::Runtime(
                 "the irradiance is not finite: the emission is too large (--light-scale)".into(),
@@ -330,14 +366,15 @@ impl Ladder<'_> {
         let off = rms(&spread, self.samples);
         let (error, maximum) = match mean == DVec3::ZERO {
             true => (0.0, 0.0),
-            false => ((OF_CHANGE * change).hypot(off), 2.0 * (largest(&local) + largest(&spread))),
+            false => (OF_CHANGE * change, 2.0 * (largest(&local) + largest(&spread))),
         };
         let estimate =
             Estimate { rms: error, maximum, mean, of_change: OF_CHANGE, steps: number + 1 };
         let reflected: DVec3 =
             at_samples.iter().zip(self.samples).map(|(w, s)| s.weight * *w).sum();
         let share = relative(reflected, mean).max_element();
-        Ok(Reached { step, coarser: None, estimate, share, spread: off })
+        let roughness = found.iter().map(Estimated::roughness).collect();
+        Ok(Reached { step, coarser: None, estimate, share, spread: off, roughness })
     }
 
     /// Solves on patches: the first ones, or those of the solution `before` split where its light
@@ -361,7 +398,7 @@ impl Ladder<'_> {
             rays: rays(share_of_rays * RAYS_OF_SPOT, tolerance),
         };
         let max_memory = self.options.max_memory;
-        let (scene, lamps) = (&self.rays.scene, (&self.rays.lamps, samples));
+        let (scene, lamps) = ((&self.rays.scene, self.scene), (&self.rays.lamps, samples));
         let known = before.map(|before| &before.radiant);
         let rows = Rows::cast(scene, mesh, &mut patches, known, lamps, max_memory, self.monitor)?;
         let direct = rows.of_cells(&patches, rows.direct.clone());
