@@ -26,13 +26,25 @@ impl Linear {
     }
 
     /// Whether no point of `polygon` has a (certainly) positive value.
+    #[inline]
     pub fn nowhere_positive(&self, polygon: &[DVec2]) -> bool {
-        polygon.iter().all(|&x| self.at(x) <= 0.0)
+        everywhere(polygon, |x| self.g.dot(x) + self.c <= self.uncertainty)
     }
 
     /// Whether no point of `polygon` has a (certainly) negative value.
+    #[inline]
     pub fn nowhere_negative(&self, polygon: &[DVec2]) -> bool {
-        polygon.iter().all(|&x| self.at(x) >= 0.0)
+        everywhere(polygon, |x| self.g.dot(x) + self.c >= -self.uncertainty)
+    }
+}
+
+/// Whether `holds` at all corners. Most polygons are triangles: there it costs less to ask at each than
+/// to guess after which to stop.
+#[inline]
+fn everywhere(polygon: &[DVec2], holds: impl Fn(DVec2) -> bool) -> bool {
+    match *polygon {
+        [a, b, c] => holds(a) & holds(b) & holds(c),
+        _ => polygon.iter().all(|&x| holds(x)),
     }
 }
 

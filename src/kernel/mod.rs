@@ -87,7 +87,8 @@ const CLOSED_FORM_ABOVE: f64 = 0.25;
 /// How precise integrals are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Precision {
-    /// Largest radius over distance for each number of Gauss points a direction, from 1 on.
+    /// Squares of the largest radius over distance for each number of Gauss points a direction, from 1
+    /// on; none is smaller than the one before.
     ladder: [f64; MOST_POINTS],
 }
 
@@ -101,13 +102,16 @@ impl Precision {
     /// Errors below `bound` times area/distance^2; those of the first moment times the radius.
     /// Exact for a bound of 0.
     pub fn within(bound: f64) -> Precision {
-        let rung = |k: usize| if bound > 0.0 { quadrature::ratio_for(k + 1, bound) } else { 0.0 };
+        let rung =
+            |k: usize| if bound > 0.0 { quadrature::ratio_for(k + 1, bound).powi(2) } else { 0.0 };
         Precision { ladder: std::array::from_fn(rung) }
     }
 
-    /// Points a direction that suffice, unless too many are needed.
-    fn points(&self, ratio: f64) -> Option<usize> {
-        self.ladder.iter().position(|&most| ratio <= most).map(|k| k + 1)
+    /// Points a direction that suffice for this square of radius over distance, unless too many are
+    /// needed.
+    fn points(&self, square: f64) -> Option<usize> {
+        let enough: usize = self.ladder.iter().map(|&most| usize::from(square <= most)).sum();
+        (enough > 0).then(|| MOST_POINTS + 1 - enough)
     }
 }
 
@@ -117,12 +121,12 @@ impl Precision {
 /// 1e-12 of the zeroth times the polygon's radius.
 pub fn moments(view: &View, polygon: &[DVec2], about: DVec2, precision: &Precision) -> Moments {
     let centre = polygon.iter().sum::<DVec2>() / polygon.len() as f64;
-    let radius = polygon.iter().map(|x| x.distance_squared(centre)).fold(0.0, f64::max).sqrt();
-    let distance = (centre.distance_squared(view.foot) + view.d * view.d).sqrt();
-    let ratio = radius / distance;
-    if let Some(points) = precision.points(ratio) {
+    let radius_squared = polygon.iter().map(|x| x.distance_squared(centre)).fold(0.0, f64::max);
+    let square = radius_squared / (centre.distance_squared(view.foot) + view.d * view.d);
+    if let Some(points) = precision.points(square) {
         return quadrature::moments(view, polygon, about, points);
     }
+    let ratio = square.sqrt();
     if ratio > CLOSED_FORM_ABOVE {
         closed_form::moments(view, polygon, about)
     } else {

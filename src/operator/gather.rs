@@ -30,7 +30,8 @@ pub struct Radiant {
     /// Faces that radiate.
     faces: Vec<u32>,
     /// Bounds of relative errors, falling, and what keeps them.
-    precisions: Vec<(f64, Precision)>,
+    bounds: [f64; PRECISIONS],
+    precisions: [Precision; PRECISIONS],
 }
 
 /// A cell on the way down.
@@ -63,9 +64,8 @@ impl Radiant {
                 (begin..end).any(|root| !field.is_dark(root))
             })
             .collect();
-        let bounds = (0..PRECISIONS).map(|k| 10f64.powf(-0.5 * k as f64));
-        let precisions = bounds.map(|bound| (bound, Precision::within(bound))).collect();
-        Radiant { field, faces, precisions }
+        let bounds = std::array::from_fn(|k| 10f64.powf(-0.5 * k as f64));
+        Radiant { field, faces, bounds, precisions: bounds.map(Precision::within) }
     }
 
     /// Faces that radiate.
@@ -180,7 +180,7 @@ impl Radiant {
 
     /// The coarsest precision with relative errors of at most `bound`; exact where that is no number.
     fn precision(&self, bound: f64) -> &Precision {
-        let found = self.precisions.iter().find(|known| known.0 <= bound);
-        found.map_or(&Precision::EXACT, |known| &known.1)
+        let enough: usize = self.bounds.iter().map(|&known| usize::from(known <= bound)).sum();
+        self.precisions.get(PRECISIONS - enough).unwrap_or(&Precision::EXACT)
     }
 }

@@ -257,7 +257,7 @@ impl Shadows {
             let edge = q - p;
             let inward = DVec2::new(-edge.y, edge.x);
             let at_foot = inward.dot(self.foot - p);
-            corners.iter().all(|w| inward.dot(w.a) + at_foot * w.b <= 0.0)
+            corners.iter().fold(true, |all, w| all & (inward.dot(w.a) + at_foot * w.b <= 0.0))
         })
     }
 
