@@ -123,6 +123,18 @@ pub fn moments(view: &View, polygon: &[DVec2], about: DVec2, precision: &Precisi
     let centre = polygon.iter().sum::<DVec2>() / polygon.len() as f64;
     let radius_squared = polygon.iter().map(|x| x.distance_squared(centre)).fold(0.0, f64::max);
     let square = radius_squared / (centre.distance_squared(view.foot) + view.d * view.d);
+    moments_at(view, polygon, about, square, precision)
+}
+
+/// As [`moments`], where the `square` of radius over distance is known: distances from the mean of the
+/// corners to the farthest of them and to the receiver.
+pub fn moments_at(
+    view: &View,
+    polygon: &[DVec2],
+    about: DVec2,
+    square: f64,
+    precision: &Precision,
+) -> Moments {
     if let Some(points) = precision.points(square) {
         return quadrature::moments(view, polygon, about, points);
     }

@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 use super::walk::{Scope, Stage, Walker};
 use crate::cluster::adaptive::Field;
 use crate::geometry::{Pieces, triangle_area};
-use crate::kernel::{Moments, Precision};
+use crate::kernel::{Moments, Precision, moments_at};
 use crate::mesh::{Basis, child};
 use crate::visibility::Coverage;
 use crate::{gray, near};
@@ -30,8 +30,8 @@ pub struct Radiant {
     /// Faces that radiate.
     faces: Vec<u32>,
     /// Bounds of relative errors, falling, and what keeps them.
-    bounds: [f64; PRECISIONS],
-    precisions: [Precision; PRECISIONS],
+    bounds: Vec<f64>,
+    precisions: Vec<Precision>,
 }
 
 /// A cell on the way down.
@@ -64,8 +64,9 @@ impl Radiant {
                 (begin..end).any(|root| !field.is_dark(root))
             })
             .collect();
-        let bounds = std::array::from_fn(|k| 10f64.powf(-0.5 * k as f64));
-        Radiant { field, faces, bounds, precisions: bounds.map(Precision::within) }
+        let bounds: Vec<f64> = (0..PRECISIONS).map(|k| 10f64.powf(-0.5 * k as f64)).collect();
+        let precisions = bounds.iter().map(|&bound| Precision::within(bound)).collect();
+        Radiant { field, faces, bounds, precisions }
     }
 
     /// Faces that radiate.
@@ -158,7 +159,11 @@ impl Radiant {
             }
             let precision =
                 self.precision(OF_INTEGRAL * allowed * PI * square / (cell.area * size));
-            let m = if clear {
+            let m = if smooth {
+                walker.counts.near += 1;
+                let square = cell.radius * cell.radius / square;
+                moments_at(view, corners, centre, square, precision)
+            } else if clear {
                 walker.counts.near += 1;
                 near::moments(view, &scope.horizon, corners, precision, clip)
             } else {

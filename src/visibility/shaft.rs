@@ -19,6 +19,9 @@ use super::occluders::Occluders;
 use super::shadows::{Coverage, continues_flat};
 use crate::geometry::Bounds;
 
+/// Pairs of an edge of one triangle and a corner of the other.
+const MOST_SIDES: usize = 18;
+
 /// A convex occluder and a shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Meeting {
@@ -173,7 +176,7 @@ impl<'a> Shaft<'a> {
             let hull = Bounds::of(self.receiver.iter().chain(&self.source));
             let size = (hull.max - hull.min).length();
             let tau = self.occluders.coincidence();
-            let mut sides = vec![];
+            let mut sides = Vec::with_capacity(MOST_SIDES);
             for (own, other) in [(&self.receiver, &self.source), (&self.source, &self.receiver)] {
                 for k in 0..3 {
                     let (p, edge, opposite) = (own[k], own[(k + 1) % 3] - own[k], own[(k + 2) % 3]);
