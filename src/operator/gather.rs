@@ -21,7 +21,7 @@ use crate::{gray, near};
 const PRECISIONS: usize = 25;
 
 /// Share of the error that a cell may make which its integral may.
-const OF_INTEGRAL: f64 = 0.25;
+const OF_INTEGRAL: f64 = 0.18;
 
 /// What radiates, ready for gathering.
 pub struct Radiant {
