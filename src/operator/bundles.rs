@@ -394,8 +394,9 @@ fn row(
     let (mut spots, mut samples) = (Cow::Borrowed(patches.spots(cell)), samples);
     let times = before.map_or(1.0, |known| {
         let Spot { face, x } = spots[0];
-        let least = if known.is_bright(face, x) { OF_BRIGHT } else { 1.0 };
-        known.power_at(face, x, patches.area[cell]).clamp(least, MOST_TIMES)
+        let there = known.patches.at(face, x);
+        let least = if known.bright.has(there) { OF_BRIGHT } else { 1.0 };
+        known.power(there, patches.area[cell]).clamp(least, MOST_TIMES)
     });
     if times >= 2.0 {
         let times = 1 << times.log2() as u32;

@@ -69,15 +69,9 @@ impl RayRadiant {
         self.bright.weight_of_ray(self.patches.at(face, x), square, cosines)
     }
 
-    /// Whether the cell at a point of a face is bright.
-    pub fn is_bright(&self, face: u32, x: DVec2) -> bool {
-        self.bright.has(self.patches.at(face, x))
-    }
-
-    /// The power of an area (m^2) that radiates like the cell at a point of a face, in units of the mean
-    /// power of a cell.
-    pub fn power_at(&self, face: u32, x: DVec2, area: f64) -> f64 {
-        let power = area * self.radiosity[self.patches.at(face, x)].max_element();
+    /// The power of an area (m^2) that radiates like a cell, in units of the mean power of a cell.
+    pub fn power(&self, cell: usize, area: f64) -> f64 {
+        let power = area * self.radiosity[cell].max_element();
         if self.mean_power > 0.0 { power / self.mean_power } else { 0.0 }
     }
 
@@ -317,7 +311,7 @@ impl Sources<'_> {
         for bounce in 0u64.. {
             let cell = radiant.patches.at(face, x);
             if bounce == MOST_BOUNCES || radiant.is_even(cell, square, cosine, rays) {
-                let (own, more) = self.of_cell(radiant, face, x);
+                let (own, more) = self.of_cell(radiant, cell, (face, x));
                 sum += weight * own;
                 change += weight * more;
                 break;
@@ -332,7 +326,8 @@ impl Sources<'_> {
             if !radiant.bright.is_empty()
                 && let Some(seen) = radiant.bright.point((scene, mesh), walker, place, number)
             {
-                let (own, more) = self.of_cell(radiant, seen.face, seen.x);
+                let cell = radiant.patches.at(seen.face, seen.x);
+                let (own, more) = self.of_cell(radiant, cell, (seen.face, seen.x));
                 sum += weight * seen.weight * own;
                 change += weight * seen.weight * more;
             }
@@ -352,11 +347,16 @@ impl Sources<'_> {
 }
 
 impl Sources<'_> {
-    /// The mean radiosity of the cell at a point of a face, and what it is more than before.
-    fn of_cell(&self, radiant: &RayRadiant, face: u32, x: DVec2) -> (DVec3, DVec3) {
-        let of = |radiant: &RayRadiant| radiant.radiosity[radiant.patches.at(face, x)];
-        let own = of(radiant);
-        (own, self.before.map_or(DVec3::ZERO, |before| own - of(before)))
+    /// The mean radiosity of a cell, and what it is more than before at a point of it.
+    fn of_cell(
+        &self,
+        radiant: &RayRadiant,
+        cell: usize,
+        (face, x): (u32, DVec2),
+    ) -> (DVec3, DVec3) {
+        let own = radiant.radiosity[cell];
+        let change = |before: &RayRadiant| own - before.radiosity[before.patches.at(face, x)];
+        (own, self.before.map_or(DVec3::ZERO, change))
     }
 }
 
