@@ -24,6 +24,9 @@ use lumel::solve::{Light, Reflected, WithinOptions, light_within};
 use lumel::{Error, Monitor, Result};
 use rayon::prelude::*;
 
+/// Points that are shown.
+const WORST: usize = 5;
+
 /// Rays of a reference.
 const RAYS: u32 = 131_072;
 
@@ -69,9 +72,10 @@ fn main() -> Result<()> {
     let own = reference(&light, &asked);
     let found: Vec<DVec3> = found.into_iter().flatten().collect();
     println!("off from the same solution gathered better: {:.2e}", off(&found, &own));
-    let finer = within(&scene, 0.25 * tolerance)?;
+    print_worst(&light.mesh, &asked, &found, &own);
+    let finer = within(&scene, 0.3 * tolerance)?;
     let right = reference(&finer, &asked);
-    println!("off from a solution for {}: {:.2e}", 0.25 * tolerance, off(&found, &right));
+    println!("off from a solution for {}: {:.2e}", 0.3 * tolerance, off(&found, &right));
     println!("of that the solution: {:.2e}", off(&own, &right));
     Ok(())
 }
@@ -132,6 +136,18 @@ fn reference(light: &Light, asked: &[RootPoints]) -> Vec<DVec3> {
         direct + reflected
     };
     asked.par_iter().map_init(Walker::default, at).collect()
+}
+
+/// The points that are off most.
+fn print_worst(mesh: &Mesh, asked: &[RootPoints], found: &[DVec3], right: &[DVec3]) {
+    let mut order: Vec<usize> = (0..asked.len()).collect();
+    let size = |&k: &usize| (found[k] - right[k]).length();
+    order.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    for k in order.into_iter().take(WORST) {
+        let frame = mesh.root_frame(asked[k].root);
+        let (at, n) = (frame.lift(asked[k].points[0]), frame.n);
+        println!("  at {at:.4} towards {n:.3}: {:.4} instead of {:.4}", found[k], right[k]);
+    }
 }
 
 /// Of the channels the largest.
