@@ -9,6 +9,7 @@ mod rooms;
 use common::{material, rotated, scene};
 use glam::{DVec2, DVec3, dvec3};
 use lumel::mesh::{Basis, Mesh, MeshOptions, Refinement};
+use lumel::operator::spread::Shares;
 use lumel::operator::{FastOptions, OperatorKind, Walker};
 use lumel::reconstruct::fill::RootPoints;
 use lumel::reconstruct::irradiance::irradiances;
@@ -84,12 +85,10 @@ fn weighed_points(light: &Light, count: usize, seed: u64) -> Vec<(u32, DVec2, f6
     };
     let (surface, all): (f64, f64) = (area.iter().sum(), (0..area.len()).map(power).sum());
     let share = |e: usize| 0.5 * area[e] / surface + 0.5 * power(e) / all;
-    let mut until: Vec<f64> = (0..area.len()).map(share).collect();
-    (1..until.len()).for_each(|e| until[e] += until[e - 1]);
+    let (shares, _) = Shares::of((0..area.len()).map(share));
     let mut random = Random::new(seed);
     let mut one = || {
-        let at = random.unit();
-        let e = until.partition_point(|&u| u <= at).min(until.len() - 1);
+        let (e, _) = shares.choose(DVec2::new(random.unit(), 0.0));
         let x = in_triangle(&mesh.element_corners[e], &mut random);
         (mesh.element_root[e], x, area[e] / surface / share(e))
     };

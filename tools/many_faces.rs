@@ -10,12 +10,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use glam::DVec3;
+use lumel::geometry::triangle_area;
 use lumel::mesh::Mesh;
 use lumel::operator::Walker;
 use lumel::operator::bundles::RayScene;
 use lumel::operator::hemisphere::{direction, flips, in_square};
 use lumel::operator::lamps::Place;
 use lumel::operator::ray_gather::{Enough, RayCounts, Sources};
+use lumel::operator::spread::{Shares, on_triangle};
 use lumel::output::machine;
 use lumel::reconstruct::fill::RootPoints;
 use lumel::reconstruct::irradiance::irradiances;
@@ -94,22 +96,13 @@ fn within(scene: &Scene, tolerance: f64) -> Result<Light> {
 
 /// Points spread over the surface by area, each asked for by itself.
 fn points(mesh: &Mesh, count: usize) -> Vec<RootPoints> {
-    let area = |t: &[glam::DVec2; 3]| 0.5 * (t[1] - t[0]).perp_dot(t[2] - t[0]);
-    let mut until = vec![];
-    let mut sum = 0.0;
-    for root in &mesh.roots {
-        sum += area(&root.corners);
-        until.push(sum);
-    }
+    let (shares, _) = Shares::of(mesh.roots.iter().map(|root| triangle_area(&root.corners)));
     (0..count)
         .map(|k| {
-            let wanted = (k as f64 + 0.5) / count as f64 * sum;
-            let root = until.partition_point(|&u| u < wanted).min(mesh.roots.len() - 1);
-            let [a, b, c] = mesh.roots[root].corners;
             let x = in_square(k as u32, [0x9e37_79b9, 0x7f4a_7c15]);
-            let side = x.x.sqrt();
-            let point = a + side * (1.0 - x.y) * (b - a) + side * x.y * (c - a);
-            RootPoints { root: root as u32, points: vec![point] }
+            let (root, rest) = shares.choose(x);
+            let ([a, b, c], w) = (mesh.roots[root].corners, on_triangle(rest));
+            RootPoints { root: root as u32, points: vec![w.x * a + w.y * b + w.z * c] }
         })
         .collect()
 }

@@ -13,6 +13,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::hemisphere::mix;
+use super::spread::on_triangle;
 use crate::error::{Error, Result};
 use crate::geometry::Pieces;
 use crate::geometry::polygon::{Linear, twice_area};
@@ -237,17 +238,17 @@ impl Patches {
                 continue;
             }
             let first = self.area.len();
-            if let Shape::Square { place, .. } = &shape {
-                let square = self.quarters(*place);
-                for part in &parts {
-                    self.add_cell(std::slice::from_ref(part), &[square + part.quarter]);
-                }
-            } else {
-                for own in in_quarters(&parts) {
-                    let square = |part: &Part| self.grids[part.face as usize].first;
-                    let squares: Vec<u32> = own.iter().map(square).collect();
-                    self.add_cell(own, &squares);
-                }
+            let first_square = match &shape {
+                Shape::Square { place, .. } => Some(self.quarters(*place)),
+                Shape::Cube { .. } => None,
+            };
+            for own in in_cells(&shape, &parts) {
+                let square = |part: &Part| match first_square {
+                    Some(square) => square + part.quarter,
+                    None => self.grids[part.face as usize].first,
+                };
+                let squares: Vec<u32> = own.iter().map(square).collect();
+                self.add_cell(own, &squares);
             }
             let single = self.area.len() == first + 1;
             self.found.push(if new && !single { UNKNOWN } else { found });
@@ -305,11 +306,7 @@ impl Patches {
             return self.spots(cell).to_vec();
         }
         let parts = parts(scene, mesh, &self.shapes[patch]);
-        let own = cell - self.cells(patch).start;
-        let own = match &self.shapes[patch] {
-            Shape::Square { .. } => std::slice::from_ref(&parts[own]),
-            Shape::Cube { .. } => in_quarters(&parts)[own],
-        };
+        let own = in_cells(&self.shapes[patch], &parts)[cell - self.cells(patch).start];
         spots(own, self.round, times * SPOTS)
     }
 
@@ -322,15 +319,10 @@ impl Patches {
         patch: usize,
     ) -> Vec<(usize, u32, Vec<DVec2>)> {
         let parts = parts(scene, mesh, &self.shapes[patch]);
-        let of_cell: Vec<usize> = match &self.shapes[patch] {
-            Shape::Square { .. } => (0..parts.len()).collect(),
-            Shape::Cube { .. } => {
-                let runs = in_quarters(&parts);
-                runs.iter().enumerate().flat_map(|(k, run)| vec![k; run.len()]).collect()
-            }
+        let own = |(cell, own): (usize, &[Part])| -> Vec<(usize, u32, Vec<DVec2>)> {
+            own.iter().map(|part| (cell, part.face, part.polygon.clone())).collect()
         };
-        let first = self.cells(patch).start;
-        of_cell.into_iter().zip(parts).map(|(k, p)| (first + k, p.face, p.polygon)).collect()
+        self.cells(patch).zip(in_cells(&self.shapes[patch], &parts)).flat_map(own).collect()
     }
 
     /// Puts the spots of a patch at other points of it, one or more.
@@ -534,8 +526,16 @@ fn inside(polygon: &[DVec2], [s, t, mut left]: [f64; 3]) -> DVec2 {
         }
         k += 1;
     }
-    let root = s.sqrt();
-    polygon[0] + root * ((1.0 - t) * (polygon[k] - polygon[0]) + t * (polygon[k + 1] - polygon[0]))
+    let w = on_triangle(DVec2::new(s, t));
+    w.x * polygon[0] + w.y * polygon[k] + w.z * polygon[k + 1]
+}
+
+/// The parts of a patch, cell by cell.
+fn in_cells<'a>(shape: &Shape, parts: &'a [Part]) -> Vec<&'a [Part]> {
+    match shape {
+        Shape::Square { .. } => parts.chunks(1).collect(),
+        Shape::Cube { .. } => in_quarters(parts),
+    }
 }
 
 /// Parts in runs of about a quarter of their area each, [`CELLS`] of them at most.
