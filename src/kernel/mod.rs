@@ -81,7 +81,7 @@ impl std::ops::AddAssign for Moments {
 /// Radius over distance above which the closed form is used.
 ///
 /// At 1/4 the closed form has lost little more than one digit (it loses about two powers of
-/// distance over radius, and one more in the first moment), and 12 x 12 Gauss points are exact.
+/// distance over radius, and one more in the first moment), and 9 x 9 Gauss points are exact.
 const CLOSED_FORM_ABOVE: f64 = 0.25;
 
 /// How precise integrals are.
