@@ -25,26 +25,32 @@ impl Linear {
         if value.abs() <= self.uncertainty { 0.0 } else { value }
     }
 
+    /// The least and the largest value at the corners of `polygon`, however uncertain.
+    #[inline]
+    pub fn range(&self, polygon: &[DVec2]) -> (f64, f64) {
+        let value = |x: DVec2| self.g.dot(x) + self.c;
+        match *polygon {
+            // Most polygons are triangles.
+            [a, b, c] => {
+                let (a, b, c) = (value(a), value(b), value(c));
+                (a.min(b).min(c), a.max(b).max(c))
+            }
+            _ => polygon.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), &x| {
+                (least.min(value(x)), most.max(value(x)))
+            }),
+        }
+    }
+
     /// Whether no point of `polygon` has a (certainly) positive value.
     #[inline]
     pub fn nowhere_positive(&self, polygon: &[DVec2]) -> bool {
-        everywhere(polygon, |x| self.g.dot(x) + self.c <= self.uncertainty)
+        self.range(polygon).1 <= self.uncertainty
     }
 
     /// Whether no point of `polygon` has a (certainly) negative value.
     #[inline]
     pub fn nowhere_negative(&self, polygon: &[DVec2]) -> bool {
-        everywhere(polygon, |x| self.g.dot(x) + self.c >= -self.uncertainty)
-    }
-}
-
-/// Whether `holds` at all corners. Most polygons are triangles: there it costs less to ask at each than
-/// to guess after which to stop.
-#[inline]
-fn everywhere(polygon: &[DVec2], holds: impl Fn(DVec2) -> bool) -> bool {
-    match *polygon {
-        [a, b, c] => holds(a) & holds(b) & holds(c),
-        _ => polygon.iter().all(|&x| holds(x)),
+        self.range(polygon).0 >= -self.uncertainty
     }
 }
 
@@ -104,12 +110,23 @@ impl Pieces {
     ///
     /// A part without a corner of certainly positive value has no area and is not added.
     pub fn push_clipped(&mut self, polygon: &[DVec2], f: &Linear) -> bool {
+        self.push_where(polygon, |i| f.at(polygon[i]))
+    }
+
+    /// The same where a linear function, of which the corners' `values` are known, is at least zero times
+    /// `sign` (1 or -1): the two signs give two parts that have just the cut in common.
+    pub fn push_part(&mut self, polygon: &[DVec2], values: &[f64], sign: f64) -> bool {
+        self.push_where(polygon, |i| sign * values[i])
+    }
+
+    #[inline]
+    fn push_where(&mut self, polygon: &[DVec2], value_at: impl Fn(usize) -> f64) -> bool {
         let begin = self.corners.len();
         let mut any_positive = false;
         let Some(&last) = polygon.last() else { return false };
-        let (mut previous, mut previous_value) = (last, f.at(last));
-        for &corner in polygon {
-            let value = f.at(corner);
+        let (mut previous, mut previous_value) = (last, value_at(polygon.len() - 1));
+        for (i, &corner) in polygon.iter().enumerate() {
+            let value = value_at(i);
             any_positive |= value > 0.0;
             if value * previous_value < 0.0 {
                 // The same expression for both orders of the end points, so that the two parts of
@@ -142,11 +159,6 @@ impl Pieces {
     }
 }
 
-/// The negative of a linear function.
-pub fn opposite(f: &Linear) -> Linear {
-    Linear { g: -f.g, c: -f.c, uncertainty: f.uncertainty }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -158,7 +170,7 @@ mod tests {
             let f = Linear { g: DVec2::from_angle(angle), c, uncertainty: 1e-15 };
             let mut pieces = Pieces::default();
             pieces.push_clipped(&square, &f);
-            pieces.push_clipped(&square, &opposite(&f));
+            pieces.push_part(&square, &square.map(|x| f.at(x)), -1.0);
             let area: f64 = pieces.iter().map(twice_area).sum();
             assert!((area - 2.0).abs() < 1e-15, "{angle} {c}");
         }

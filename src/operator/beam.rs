@@ -207,6 +207,7 @@ impl Beam {
     ) -> DVec3 {
         let Stage { mesh, occluders, .. } = stage;
         let observer = Observer { occluders, point, normal };
+        walker.shadows.look_from(&observer);
         let mut clip = std::mem::take(&mut walker.clip);
         let mut numbers = std::mem::take(&mut walker.numbers);
         let mut sum = DVec3::ZERO;

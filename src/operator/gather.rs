@@ -11,6 +11,7 @@ use glam::{DVec2, DVec3};
 
 use super::walk::{Scope, Stage, Walker};
 use crate::cluster::adaptive::Field;
+use crate::cluster::fit::Fit;
 use crate::geometry::{Pieces, triangle_area};
 use crate::kernel::{Moments, Precision, moments_at};
 use crate::mesh::{Basis, child};
@@ -27,11 +28,44 @@ const OF_INTEGRAL: f64 = 0.18;
 pub struct Radiant {
     /// Radiosity, W/m^2.
     pub field: Field,
+    /// The fits again, cell by cell.
+    planes: Vec<Plane>,
     /// Faces that radiate.
     faces: Vec<u32>,
     /// Bounds of relative errors, falling, and what keeps them.
     bounds: Vec<f64>,
     precisions: Vec<Precision>,
+}
+
+/// A linear fit as gathering takes it: its value at x is mean + (x - centroid) . gradient.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    /// Value at the cell's centroid, W/m^2.
+    mean: DVec3,
+    /// Derivatives along the two axes of the face's plane, W/m^3.
+    gradient: [DVec3; 2],
+    /// The largest value at a node, of all channels.
+    size: f64,
+}
+
+impl Plane {
+    fn new(corners: &[DVec2; 3], fit: &Fit<3>) -> Plane {
+        // Integrals of one linear function each.
+        let of = |zeroth, first| {
+            let c = near::coefficients(Moments { zeroth, first }, corners, Basis::Linear);
+            fit.iter().zip(c).map(|(value, c)| c * DVec3::from_array(*value)).sum()
+        };
+        Plane {
+            mean: of(1.0, DVec2::ZERO),
+            gradient: [of(0.0, DVec2::X), of(0.0, DVec2::Y)],
+            size: fit.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs())),
+        }
+    }
+
+    /// The integral of its product with what has these moments about the centroid.
+    fn integral(&self, m: Moments) -> DVec3 {
+        m.zeroth * self.mean + m.first.x * self.gradient[0] + m.first.y * self.gradient[1]
+    }
 }
 
 /// A cell on the way down.
@@ -64,9 +98,21 @@ impl Radiant {
                 (begin..end).any(|root| !field.is_dark(root))
             })
             .collect();
+        let mut planes: Vec<Plane> = Vec::with_capacity(field.fits.len());
+        let mut corners: Vec<[DVec2; 3]> = stage.mesh.roots.iter().map(|r| r.corners).collect();
+        for cell in 0..field.fits.len() {
+            // Children come after their parents.
+            if let Some(first) = field.tree.children(cell as u32) {
+                corners.resize(corners.len().max(first as usize + 4), [DVec2::ZERO; 3]);
+                for k in 0..4 {
+                    corners[first as usize + k] = child(&corners[cell], k);
+                }
+            }
+            planes.push(Plane::new(&corners[cell], &field.fits[cell]));
+        }
         let bounds: Vec<f64> = (0..PRECISIONS).map(|k| 10f64.powf(-0.5 * k as f64)).collect();
         let precisions = bounds.iter().map(|&bound| Precision::within(bound)).collect();
-        Radiant { field, faces, bounds, precisions }
+        Radiant { field, planes, faces, bounds, precisions }
     }
 
     /// Faces that radiate.
@@ -126,20 +172,21 @@ impl Radiant {
         let view = &scope.view;
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
         let square = (centre - view.foot).length_squared() + view.d * view.d;
-        let distance = square.sqrt();
-        // A bound on cos/d^2 over the cell.
-        let nearest = distance - cell.radius;
-        let factor = if nearest > 0.0 {
-            cell.area * (view.d / nearest).min(1.0) / (PI * nearest * nearest)
-        } else {
-            f64::INFINITY
-        };
+        let nearest = square.sqrt() - cell.radius;
         // Where the horizon crosses it G has a kink.
         let smooth = clear && scope.horizon.nowhere_negative(corners);
-        let curved = if smooth { (cell.radius * cell.radius / square).min(1.0) } else { 1.0 };
-        let error = self.field.deviation[cell.number as usize] * factor * curved;
+        // A bound on the error is deviation area/pi times one on cos cos/d^2 over the cell: heights over
+        // distances, heights over the point's horizon being at most R more than in the middle. Times
+        // (R/distance)^2 where it is smooth.
+        let above = scope.horizon.g.dot(centre) + scope.horizon.c + cell.radius;
+        let deviation = self.field.deviation[cell.number as usize];
+        let error = deviation * cell.area * view.d.min(nearest) * above.min(nearest);
+        let most = PI * allowed * (nearest * nearest) * (nearest * nearest);
+        let radius_squared = cell.radius * cell.radius;
+        let is_small = error <= most || smooth && error * radius_squared <= most * square;
+        let is_good = deviation == 0.0 || nearest > 0.0 && is_small;
         let mut sum = DVec3::ZERO;
-        let below = (error > allowed).then(|| self.field.tree.children(cell.number)).flatten();
+        let below = if is_good { None } else { self.field.tree.children(cell.number) };
         if let Some(first) = below {
             for k in 0..4 {
                 let below = Cell {
@@ -151,33 +198,27 @@ impl Radiant {
                 sum += self.descend(walker, scope, below, to, allowed, clip);
             }
         } else {
-            let fit = &self.field.fits[cell.number as usize];
-            let size = fit.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
-            if size == 0.0 {
+            let plane = &self.planes[cell.number as usize];
+            if plane.size == 0.0 {
                 walker.active.truncate(to);
                 return DVec3::ZERO;
             }
             let precision =
-                self.precision(OF_INTEGRAL * allowed * PI * square / (cell.area * size));
-            let m = if smooth {
+                self.precision(OF_INTEGRAL * allowed * PI * square / (cell.area * plane.size));
+            let m = if clear {
                 walker.counts.near += 1;
-                let square = cell.radius * cell.radius / square;
-                moments_at(view, corners, centre, square, precision)
-            } else if clear {
-                walker.counts.near += 1;
-                near::moments(view, &scope.horizon, corners, precision, clip)
+                if smooth {
+                    moments_at(view, corners, centre, radius_squared / square, precision)
+                } else {
+                    near::moments(view, &scope.horizon, corners, precision, clip)
+                }
             } else {
                 let pieces = walker.shadows.visible(corners, &walker.active[to..]);
                 walker.counts.gray += u64::from(!pieces.is_empty());
                 walker.counts.hidden += u64::from(pieces.is_empty());
                 gray::moments(view, &scope.horizon, corners, pieces, precision, clip)
             };
-            if m != Moments::default() {
-                let c = near::coefficients(m, corners, Basis::Linear);
-                for (value, c) in fit.iter().zip(c) {
-                    sum += c * DVec3::from_array(*value);
-                }
-            }
+            sum = plane.integral(m);
         }
         walker.active.truncate(to);
         sum

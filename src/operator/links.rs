@@ -72,6 +72,7 @@ impl Linker {
         for node in first..first + mesh.basis.nodes() {
             let (point, normal) = mesh.node(node);
             let observer = Observer { occluders, point, normal };
+            self.shadows.look_from(&observer);
             for g in 0..self.runs.list.len() {
                 let group = self.runs.list[g];
                 let (first, end) = group.sources;

@@ -204,6 +204,7 @@ impl Walker {
     ) {
         let Stage { mesh, clusters, occluders } = stage;
         let observer = Observer { occluders, point, normal };
+        self.shadows.look_from(&observer);
         let tau = occluders.coincidence();
         match only {
             None => {

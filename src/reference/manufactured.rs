@@ -119,6 +119,7 @@ impl Sight {
         self.clip.clear();
         self.clip.push_clipped(&corners, &horizon);
         let observer = Observer { occluders, point, normal };
+        self.shadows.look_from(&observer);
         let above = self.clip.get(0).to_vec();
         self.active.clear();
         self.shadows.find(&observer, floor, &above, &mut self.active);

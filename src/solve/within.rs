@@ -382,9 +382,15 @@ impl Ladder<'_> {
             a.iter().zip(b).map(|(a, b)| relative((*a - *b).abs(), mean)).collect()
         };
         let some: Vec<Sample> = samples.iter().step_by(GATHERED_AGAIN).copied().collect();
-        let once: Vec<DVec3> = found.iter().step_by(GATHERED_AGAIN).copied().collect();
-        let again = gathered(stage, &apart.reflected, &some, 0.1 * allowed, self.monitor)?;
-        let gathering = off_by(&once, &again);
+        // The first solution has no estimate: what gathering is off by does not matter.
+        let gathering = match before {
+            Some(_) => {
+                let once: Vec<DVec3> = found.iter().step_by(GATHERED_AGAIN).copied().collect();
+                let finer = 0.1 * allowed;
+                off_by(&once, &gathered(stage, &apart.reflected, &some, finer, self.monitor)?)
+            }
+            None => vec![DVec3::ZERO; some.len()],
+        };
         let direct: Vec<DVec3> = self.direct_off.iter().map(|x| relative(*x, mean)).collect();
         let mut changes = before.map_or(vec![], |b| b.changes.clone());
         let local = match before {

@@ -9,6 +9,7 @@
 mod occluders;
 mod shadows;
 mod shaft;
+mod silhouettes;
 
 pub use occluders::Occluders;
 pub use shadows::{Coverage, Observer, Shadows, faces_away};

@@ -3,7 +3,8 @@
 use glam::{DVec2, DVec3};
 
 use super::Occluders;
-use crate::geometry::polygon::{Linear, Pieces, opposite};
+use super::silhouettes::Silhouettes;
+use crate::geometry::polygon::{Linear, Pieces};
 use crate::geometry::{Bounds, Frame};
 
 /// Normals closer than this (radians, for small angles) bound a dihedral angle that light hardly
@@ -35,20 +36,6 @@ impl Observer<'_> {
     pub fn faces_away(&self, n: DVec3) -> bool {
         faces_away(self.normal, n)
     }
-
-    /// Whether the occluder blocks nothing that matters, seen from this point: the point is in its
-    /// plane, or it is all at or below the horizon, or it continues the point's own flat surface.
-    fn cannot_be_shaded_by(&self, index: usize) -> bool {
-        let (on_plane, n) = self.occluders.plane(index);
-        let (tau, height) = (self.occluders.coincidence(), (self.point - on_plane).dot(n));
-        if height.abs() <= tau {
-            return true;
-        }
-        if continues_flat(self.normal, n, &[height]) {
-            return true;
-        }
-        self.occluders.corners(index).iter().all(|&w| (w - self.point).dot(self.normal) <= tau)
-    }
 }
 
 /// Whether light between planes with these unit normals is negligible however they lie.
@@ -61,6 +48,12 @@ pub fn faces_away(receiver: DVec3, source: DVec3) -> bool {
 pub(super) fn continues_flat(normal: DVec3, n: DVec3, heights: &[f64]) -> bool {
     let side = n.dot(normal).signum();
     heights.iter().all(|h| h * side > 0.0) && faces_away(normal, side * n)
+}
+
+/// Distance of the farthest corner of a polygon.
+fn reach(frame: &Frame, polygon: &[DVec2], point: DVec3) -> f64 {
+    let squares = polygon.iter().map(|&x| frame.lift(x).distance_squared(point));
+    squares.fold(0.0, f64::max).sqrt()
 }
 
 /// What is seen of a polygon.
@@ -102,7 +95,9 @@ pub struct Shadows {
     lines: Vec<Linear>,
     corners: Vec<Corner>,
     foot: DVec2,
+    silhouettes: Silhouettes,
     found: Vec<usize>,
+    values: Vec<f64>,
     now: Pieces,
     next: Pieces,
     inside: Pieces,
@@ -110,8 +105,13 @@ pub struct Shadows {
 }
 
 impl Shadows {
+    /// Looks from another point: to be called before shadows are found from there.
+    pub fn look_from(&mut self, observer: &Observer) {
+        self.silhouettes.look_from(observer);
+    }
+
     /// Finds the occluders that may shade the convex `polygon` (plane coordinates of `frame`) from
-    /// `observer`, and their shadows. Numbers of these, for [`Shadows::narrow`], go to `active`.
+    /// `observer` ([`Shadows::look_from`]), and their shadows. Numbers of these, for [`Shadows::narrow`], go to `active`.
     pub fn find(
         &mut self,
         observer: &Observer,
@@ -129,7 +129,7 @@ impl Shadows {
         let lifted = |x: DVec2| frame.lift(x);
         let hull =
             polygon.iter().fold(Bounds { min: point, max: point }, |b, &x| b.with(lifted(x)));
-        let reach = polygon.iter().map(|&x| lifted(x).distance(point)).fold(0.0, f64::max);
+        let reach = reach(frame, polygon, point);
         // Planes through the observer and the polygon's edges; the polygon is on the positive side.
         let beam = |i: usize| {
             let (p, q) = (lifted(polygon[i]), lifted(polygon[(i + 1) % polygon.len()]));
@@ -153,7 +153,12 @@ impl Shadows {
         self.found.sort_unstable();
         for k in 0..self.found.len() {
             let index = self.found[k];
-            active.extend(self.try_add(observer, frame, polygon, index, reach));
+            let Some(shadow) = self.add(observer, frame, index, reach) else { continue };
+            if self.leaves(shadow as usize, polygon) == Coverage::Full {
+                self.drop_last();
+            } else {
+                active.push(shadow);
+            }
         }
     }
 
@@ -174,91 +179,77 @@ impl Shadows {
         self.lines.clear();
         self.corners.clear();
         self.foot = frame.project(observer.point);
-        let distance = |&x: &DVec2| frame.lift(x).distance(observer.point);
-        let reach = polygon.iter().map(distance).fold(0.0, f64::max);
+        let reach = reach(frame, polygon, observer.point);
         for &index in candidates {
-            let number = self.try_add(observer, frame, polygon, index as usize, reach);
+            let number = self.add(observer, frame, index as usize, reach);
             numbers.push(number.unwrap_or(Self::NONE));
         }
     }
 
-    /// Adds the shadow of an occluder that may shade the polygon; its number.
-    fn try_add(
-        &mut self,
-        observer: &Observer,
-        frame: &Frame,
-        polygon: &[DVec2],
-        index: usize,
-        reach: f64,
-    ) -> Option<u32> {
-        let tau = observer.occluders.coincidence();
-        if observer.cannot_be_shaded_by(index)
-            || observer.occluders.corners(index).iter().all(|&w| frame.height(w) <= tau)
-        {
-            return None;
-        }
-        self.add(observer, frame, index, reach);
-        let number = self.shadows.len() - 1;
-        if self.misses(number, polygon) {
-            let shadow = self.shadows.pop()?;
-            self.lines.truncate(shadow.begin);
-            self.corners.truncate(shadow.first);
-            return None;
-        }
-        Some(number as u32)
-    }
-
-    fn add(&mut self, observer: &Observer, frame: &Frame, index: usize, reach: f64) {
+    /// Adds the shadow of an occluder, if it may shade anything of the plane; its number.
+    fn add(&mut self, observer: &Observer, frame: &Frame, index: usize, reach: f64) -> Option<u32> {
+        let silhouette = self.silhouettes.of(observer, index)?;
         let tau = observer.occluders.coincidence();
         let point = observer.point;
-        let corners = observer.occluders.corners(index);
+        if observer.occluders.corners(index).iter().all(|&w| frame.height(w) <= tau) {
+            return None;
+        }
         let (on_plane, n) = observer.occluders.plane(index);
-        // Seen from its front the corners run counter-clockwise, and the cross products of
-        // successive corners point outward.
-        let side = -(point - on_plane).dot(n).signum();
         let (begin, first) = (self.lines.len(), self.corners.len());
         let line = |normal: DVec3, through: DVec3, uncertainty: f64| Linear {
             g: DVec2::new(normal.dot(frame.u), normal.dot(frame.v)),
             c: normal.dot(frame.origin - through),
             uncertainty,
         };
-        for (i, &w) in corners.iter().enumerate() {
-            // a x edge is a x b, without the cancellation for short edges.
-            let (a, edge) = (w - point, corners[(i + 1) % corners.len()] - w);
-            let normal = side * a.cross(edge);
+        let d = frame.height(point);
+        for edge in &self.silhouettes.edges[silhouette.begin..silhouette.end] {
             // What shifts of P, x and the edge by tau do to the volume a x edge . (x - P), and what
             // shifts of the edge's ends by tau against each other do.
-            let shifted = edge.length() * (a.length() + reach);
-            let turned = 2.0 * (a.length() + edge.length()) * reach;
-            let uncertainty = tau * shifted + (tau * turned).min(TURN * normal.length() * reach);
-            self.lines.push(line(normal, point, uncertainty));
+            let shifted = edge.edge * (edge.distance + reach);
+            let turned = 2.0 * (edge.distance + edge.edge) * reach;
+            let uncertainty = tau * shifted + (tau * turned).min(TURN * edge.twice_area * reach);
+            self.lines.push(line(edge.normal, point, uncertainty));
+            let w = edge.to_corner;
+            let a = d * DVec2::new(w.dot(frame.u), w.dot(frame.v));
+            self.corners.push(Corner { a, b: -w.dot(frame.n) });
         }
-        self.lines.push(line(side * n, on_plane, tau));
-        let d = frame.height(point);
-        self.corners.extend(
-            corners
-                .iter()
-                .map(|&w| Corner { a: (frame.project(w) - self.foot) * d, b: d - frame.height(w) }),
-        );
+        self.lines.push(line(silhouette.side * n, on_plane, tau));
         let (end, last) = (self.lines.len(), self.corners.len());
         self.shadows.push(Shadow { begin, end, first, last });
+        Some(self.shadows.len() as u32 - 1)
     }
 
-    /// Whether a shadow certainly does not touch the inside of a convex polygon: a line separates
-    /// them. For two convex sets in a plane some line along a side of one of them does.
-    fn misses(&self, shadow: usize, polygon: &[DVec2]) -> bool {
+    fn drop_last(&mut self) {
+        if let Some(shadow) = self.shadows.pop() {
+            self.lines.truncate(shadow.begin);
+            self.corners.truncate(shadow.first);
+        }
+    }
+
+    /// What one shadow leaves to be seen of a convex polygon. All of it where a line certainly separates
+    /// them: for two convex sets in a plane some line along a side of one of them does.
+    fn leaves(&self, shadow: usize, polygon: &[DVec2]) -> Coverage {
         let Shadow { begin, end, first, last } = self.shadows[shadow];
-        if self.lines[begin..end].iter().any(|f| f.nowhere_positive(polygon)) {
-            return true;
+        let mut inside = true;
+        for f in &self.lines[begin..end] {
+            let (least, most) = f.range(polygon);
+            if most <= f.uncertainty {
+                return Coverage::Full;
+            }
+            inside &= least >= -f.uncertainty;
+        }
+        if inside {
+            return Coverage::Hidden;
         }
         let corners = &self.corners[first..last];
-        (0..polygon.len()).any(|i| {
+        let separated = (0..polygon.len()).any(|i| {
             let (p, q) = (polygon[i], polygon[(i + 1) % polygon.len()]);
             let edge = q - p;
             let inward = DVec2::new(-edge.y, edge.x);
             let at_foot = inward.dot(self.foot - p);
             corners.iter().fold(true, |all, w| all & (inward.dot(w.a) + at_foot * w.b <= 0.0))
-        })
+        });
+        if separated { Coverage::Full } else { Coverage::Partial }
     }
 
     /// Of the shadows `active[from..]`, appends to `active` those that may touch `polygon`.
@@ -268,15 +259,14 @@ impl Shadows {
         let to = active.len();
         for k in from..to {
             let shadow = active[k];
-            if self.misses(shadow as usize, polygon) {
-                continue;
+            match self.leaves(shadow as usize, polygon) {
+                Coverage::Full => {}
+                Coverage::Hidden => {
+                    active.truncate(to);
+                    return Coverage::Hidden;
+                }
+                Coverage::Partial => active.push(shadow),
             }
-            let Shadow { begin, end, .. } = self.shadows[shadow as usize];
-            if self.lines[begin..end].iter().all(|f| f.nowhere_negative(polygon)) {
-                active.truncate(to);
-                return Coverage::Hidden;
-            }
-            active.push(shadow);
         }
         if active.len() == to { Coverage::Full } else { Coverage::Partial }
     }
@@ -297,18 +287,21 @@ impl Shadows {
                 let mut shaded = true;
                 for (k, f) in lines.iter().enumerate() {
                     let rest = self.inside.get(0);
+                    let values = &mut self.values;
+                    values.clear();
+                    values.extend(rest.iter().map(|&x| f.at(x)));
                     // What lies in the occluder's plane, the last line, it does not shade. A thin
                     // occluder's plane is known where the occluder is: here, between its edges.
-                    if k + 1 == lines.len() && f.nowhere_positive(rest) {
+                    if k + 1 == lines.len() && values.iter().all(|&v| v <= 0.0) {
                         shaded = false;
                         break;
                     }
-                    if f.nowhere_negative(rest) {
+                    if values.iter().all(|&v| v >= 0.0) {
                         continue;
                     }
-                    self.next.push_clipped(rest, &opposite(f));
+                    self.next.push_part(rest, values, -1.0);
                     self.spare.clear();
-                    if !self.spare.push_clipped(rest, f) {
+                    if !self.spare.push_part(rest, values, 1.0) {
                         shaded = false;
                         break;
                     }

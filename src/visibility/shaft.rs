@@ -47,6 +47,7 @@ pub struct Shaft<'a> {
     source: [DVec3; 3],
     /// Unit normals of the sides that receive and send.
     normals: (DVec3, DVec3),
+    hull: Bounds,
     sides: OnceCell<Vec<Side>>,
 }
 
@@ -58,13 +59,14 @@ impl<'a> Shaft<'a> {
         (source, source_normal): ([DVec3; 3], DVec3),
     ) -> Shaft<'a> {
         let normals = (receiver_normal, source_normal);
-        Shaft { occluders, receiver, source, normals, sides: OnceCell::new() }
+        let hull = Bounds::of(receiver.iter().chain(&source));
+        Shaft { occluders, receiver, source, normals, hull, sides: OnceCell::new() }
     }
 
     /// Appends to `found`, in ascending order, the occluders that may stand between.
     pub fn find(&self, found: &mut Vec<u32>) {
         let from = found.len();
-        let hull = Bounds::of(self.receiver.iter().chain(&self.source));
+        let hull = self.hull;
         let (up, out) = self.normals;
         let (on_receiver, on_source) = (self.receiver[0], self.source[0]);
         self.occluders.tree.visit(
@@ -162,7 +164,7 @@ impl<'a> Shaft<'a> {
 
     /// A bound on all distances between points of the shaft and of an occluder.
     fn reach(&self, corners: &[DVec3]) -> f64 {
-        let all = Bounds::of(self.receiver.iter().chain(&self.source).chain(corners));
+        let all = corners.iter().fold(self.hull, |all, &w| all.with(w));
         (all.max - all.min).length()
     }
 
@@ -173,8 +175,7 @@ impl<'a> Shaft<'a> {
     /// whatever its normal is, to a rounding of coordinates.
     fn sides(&self) -> &[Side] {
         self.sides.get_or_init(|| {
-            let hull = Bounds::of(self.receiver.iter().chain(&self.source));
-            let size = (hull.max - hull.min).length();
+            let size = (self.hull.max - self.hull.min).length();
             let tau = self.occluders.coincidence();
             let mut sides = Vec::with_capacity(MOST_SIDES);
             for (own, other) in [(&self.receiver, &self.source), (&self.source, &self.receiver)] {
@@ -187,14 +188,15 @@ impl<'a> Shaft<'a> {
                         if turn.is_nan() || turn >= 1.0 {
                             continue;
                         }
-                        for n in [n / length, -n / length] {
-                            let height = |x: &DVec3| n.dot(*x - p);
-                            let rest = std::iter::once(&opposite).chain(other);
-                            let highest = rest.map(height).fold(0.0, f64::max);
-                            if highest <= turn * size {
-                                sides.push(Side { n, c: n.dot(p) + highest });
-                                break;
-                            }
+                        let n = n / length;
+                        let [a, b, c, d] =
+                            [opposite, other[0], other[1], other[2]].map(|x| n.dot(x - p));
+                        let highest = a.max(b).max(c.max(d)).max(0.0);
+                        let lowest = a.min(b).min(c.min(d)).min(0.0);
+                        if highest <= turn * size {
+                            sides.push(Side { n, c: n.dot(p) + highest });
+                        } else if -lowest <= turn * size {
+                            sides.push(Side { n: -n, c: -(n.dot(p) + lowest) });
                         }
                     }
                 }

@@ -46,6 +46,7 @@ pub fn look(sight: &Sight, levels: u32) -> Look {
     if horizon.nowhere_positive(&corners) {
         return look;
     }
+    shadows.look_from(&observer);
     shadows.find(&observer, &frame, &corners, &mut active);
     look.clear = active.is_empty();
     descend(&mut look, &mut shadows, &mut active, &corners, 0, levels, 0);

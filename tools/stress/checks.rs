@@ -200,6 +200,7 @@ fn share_seen(
     let small =
         [DVec2::new(1.0, 0.0), DVec2::new(-0.5, 0.8), DVec2::new(-0.5, -0.8)].map(|d| x + s * d);
     let mut active = vec![];
+    shadows.look_from(&observer);
     shadows.find(&observer, &frame, &small, &mut active);
     if active.is_empty() {
         return 1.0;
