@@ -234,6 +234,9 @@ impl Beam {
                 walker.active.clear();
                 let shadows = self.runs.places[places].iter().map(|&p| numbers[p as usize]);
                 walker.active.extend(shadows.filter(|&number| number != Shadows::NONE));
+                // Faces of one body have the same shadow.
+                walker.active.sort_unstable();
+                walker.active.dedup();
                 let cell = Cell {
                     number: source.number,
                     corners: &source.corners,

@@ -143,6 +143,9 @@ impl Linker {
             self.active.clear();
             let shadows = self.runs.places[places].iter().map(|&p| self.numbers[p as usize]);
             self.active.extend(shadows.filter(|&number| number != Shadows::NONE));
+            // Faces of one body have the same shadow.
+            self.active.sort_unstable();
+            self.active.dedup();
             let to = self.active.len();
             let coverage = match to {
                 0 => Coverage::Full,

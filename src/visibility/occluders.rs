@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+use super::bodies::{self, Body};
 use crate::geometry::{Bounds, BoxTree, COINCIDENCE, Frame};
 
 /// All occluders of a scene.
@@ -14,6 +15,9 @@ pub struct Occluders {
     /// Triangles of the input that each occluder covers, end to end.
     members: Vec<u32>,
     member_ends: Vec<usize>,
+    /// Convex bodies, and by occluder the body that it is a face of.
+    pub(super) bodies: Vec<Body>,
+    pub(super) body_of: Vec<u32>,
     pub(super) tree: BoxTree,
     /// Largest coordinate of the scene in size; what roundings are relative to.
     pub magnitude: f64,
@@ -35,6 +39,8 @@ impl Occluders {
             planes: vec![],
             members: vec![],
             member_ends: vec![],
+            bodies: vec![],
+            body_of: vec![],
             tree: BoxTree::build(&[]),
             magnitude,
         };
@@ -48,6 +54,7 @@ impl Occluders {
             occluders.member_ends.push(occluders.members.len());
         }
         occluders.tree = BoxTree::build(&boxes);
+        (occluders.bodies, occluders.body_of) = bodies::find(&occluders);
         occluders
     }
 

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::Occluders;
-use super::silhouettes::Silhouettes;
+use super::silhouettes::{Seen, Silhouette, Silhouettes};
 use crate::geometry::polygon::{Linear, Pieces};
 use crate::geometry::{Bounds, Frame};
 
@@ -70,8 +70,10 @@ pub enum Coverage {
 /// One occluder's shadow on the source plane.
 #[derive(Clone, Copy, Debug)]
 struct Shadow {
-    /// Its bounding lines: `lines[begin..end]`, all >= 0 inside, the last one the occluder's plane.
+    /// Its bounding lines: `lines[begin..end]`, all >= 0 inside, from `planes` on those of the planes
+    /// that it lies beyond.
     begin: usize,
+    planes: usize,
     end: usize,
     /// Its corners in `corners[first..last]`.
     first: usize,
@@ -96,6 +98,8 @@ pub struct Shadows {
     corners: Vec<Corner>,
     foot: DVec2,
     silhouettes: Silhouettes,
+    /// Bodies that were looked at, and the number of the shadow of each that casts one.
+    bodies: Vec<(u32, Option<u32>)>,
     found: Vec<usize>,
     values: Vec<f64>,
     now: Pieces,
@@ -122,6 +126,7 @@ impl Shadows {
         self.shadows.clear();
         self.lines.clear();
         self.corners.clear();
+        self.bodies.clear();
         self.found.clear();
         let (point, normal) = (observer.point, observer.normal);
         let tau = observer.occluders.coincidence();
@@ -153,7 +158,12 @@ impl Shadows {
         self.found.sort_unstable();
         for k in 0..self.found.len() {
             let index = self.found[k];
+            let known = self.shadows.len();
             let Some(shadow) = self.add(observer, frame, index, reach) else { continue };
+            // Another face of a body.
+            if self.shadows.len() == known {
+                continue;
+            }
             if self.leaves(shadow as usize, polygon) == Coverage::Full {
                 self.drop_last();
             } else {
@@ -178,6 +188,7 @@ impl Shadows {
         self.shadows.clear();
         self.lines.clear();
         self.corners.clear();
+        self.bodies.clear();
         self.foot = frame.project(observer.point);
         let reach = reach(frame, polygon, observer.point);
         for &index in candidates {
@@ -186,15 +197,40 @@ impl Shadows {
         }
     }
 
-    /// Adds the shadow of an occluder, if it may shade anything of the plane; its number.
+    /// The shadow of an occluder, or of the body that it is a face of, if it may shade anything of the
+    /// plane.
     fn add(&mut self, observer: &Observer, frame: &Frame, index: usize, reach: f64) -> Option<u32> {
-        let silhouette = self.silhouettes.of(observer, index)?;
+        let occluders = observer.occluders;
+        match self.silhouettes.of(observer, index) {
+            Seen::Nothing => None,
+            Seen::Alone(outline) => {
+                self.add_outline(observer, frame, &outline, occluders.corners(index), reach)
+            }
+            Seen::Together(body, outline) => {
+                if let Some((_, shadow)) = self.bodies.iter().find(|known| known.0 == body) {
+                    return *shadow;
+                }
+                let corners = &occluders.bodies[body as usize].corners;
+                let shadow = self.add_outline(observer, frame, &outline, corners, reach);
+                self.bodies.push((body, shadow));
+                shadow
+            }
+        }
+    }
+
+    fn add_outline(
+        &mut self,
+        observer: &Observer,
+        frame: &Frame,
+        outline: &Silhouette,
+        corners: &[DVec3],
+        reach: f64,
+    ) -> Option<u32> {
         let tau = observer.occluders.coincidence();
-        let point = observer.point;
-        if observer.occluders.corners(index).iter().all(|&w| frame.height(w) <= tau) {
+        if corners.iter().all(|&w| frame.height(w) <= tau) {
             return None;
         }
-        let (on_plane, n) = observer.occluders.plane(index);
+        let point = observer.point;
         let (begin, first) = (self.lines.len(), self.corners.len());
         let line = |normal: DVec3, through: DVec3, uncertainty: f64| Linear {
             g: DVec2::new(normal.dot(frame.u), normal.dot(frame.v)),
@@ -202,7 +238,7 @@ impl Shadows {
             uncertainty,
         };
         let d = frame.height(point);
-        for edge in &self.silhouettes.edges[silhouette.begin..silhouette.end] {
+        for edge in &self.silhouettes.edges[outline.begin..outline.end] {
             // What shifts of P, x and the edge by tau do to the volume a x edge . (x - P), and what
             // shifts of the edge's ends by tau against each other do.
             let shifted = edge.edge * (edge.distance + reach);
@@ -213,9 +249,12 @@ impl Shadows {
             let a = d * DVec2::new(w.dot(frame.u), w.dot(frame.v));
             self.corners.push(Corner { a, b: -w.dot(frame.n) });
         }
-        self.lines.push(line(silhouette.side * n, on_plane, tau));
+        let planes = self.lines.len();
+        for &(on_plane, beyond) in &self.silhouettes.planes[outline.first..outline.last] {
+            self.lines.push(line(beyond, on_plane, tau));
+        }
         let (end, last) = (self.lines.len(), self.corners.len());
-        self.shadows.push(Shadow { begin, end, first, last });
+        self.shadows.push(Shadow { begin, planes, end, first, last });
         Some(self.shadows.len() as u32 - 1)
     }
 
@@ -223,13 +262,15 @@ impl Shadows {
         if let Some(shadow) = self.shadows.pop() {
             self.lines.truncate(shadow.begin);
             self.corners.truncate(shadow.first);
+            let number = self.shadows.len() as u32;
+            self.bodies.iter_mut().filter(|(_, s)| *s == Some(number)).for_each(|b| b.1 = None);
         }
     }
 
     /// What one shadow leaves to be seen of a convex polygon. All of it where a line certainly separates
     /// them: for two convex sets in a plane some line along a side of one of them does.
     fn leaves(&self, shadow: usize, polygon: &[DVec2]) -> Coverage {
-        let Shadow { begin, end, first, last } = self.shadows[shadow];
+        let Shadow { begin, end, first, last, .. } = self.shadows[shadow];
         let mut inside = true;
         for f in &self.lines[begin..end] {
             let (least, most) = f.range(polygon);
@@ -277,7 +318,7 @@ impl Shadows {
         self.now.clear();
         self.now.push(polygon);
         for &shadow in active {
-            let Shadow { begin, end, .. } = self.shadows[shadow as usize];
+            let Shadow { begin, planes, end, .. } = self.shadows[shadow as usize];
             let lines = &self.lines[begin..end];
             self.next.clear();
             for piece in self.now.iter() {
@@ -290,9 +331,9 @@ impl Shadows {
                     let values = &mut self.values;
                     values.clear();
                     values.extend(rest.iter().map(|&x| f.at(x)));
-                    // What lies in the occluder's plane, the last line, it does not shade. A thin
+                    // What lies in the plane of an occluder it does not shade. A thin
                     // occluder's plane is known where the occluder is: here, between its edges.
-                    if k + 1 == lines.len() && values.iter().all(|&v| v <= 0.0) {
+                    if begin + k >= planes && values.iter().all(|&v| v <= 0.0) {
                         shaded = false;
                         break;
                     }

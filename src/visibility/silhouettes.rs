@@ -2,12 +2,13 @@
 
 use glam::DVec3;
 
+use super::bodies::{Body, Face, MOST_FACES, NONE};
 use super::shadows::{Observer, continues_flat};
 
 /// The plane through the observer and an edge of an occluder.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EdgePlane {
-    /// From the observer to the edge's first corner, metres.
+    /// From the observer to the corner of the edge where it begins, seen counter-clockwise, metres.
     pub to_corner: DVec3,
     /// Normal that points to the occluder's side; twice the area of the triangle from the observer long.
     pub normal: DVec3,
@@ -17,14 +18,26 @@ pub(super) struct EdgePlane {
     pub edge: f64,
 }
 
-/// An occluder that may block light.
+/// An occluder, or a convex body of several, that may block light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Silhouette {
     /// Its edges: `edges[begin..end]` of [`Silhouettes`].
     pub begin: usize,
     pub end: usize,
-    /// 1 where its own normal points away from the observer, -1 where towards it.
-    pub side: f64,
+    /// It shades what is beyond all of `planes[first..last]`.
+    pub first: usize,
+    pub last: usize,
+}
+
+/// What is seen of an occluder.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Seen {
+    /// It blocks nothing that matters.
+    Nothing,
+    /// It casts a shadow of its own.
+    Alone(Silhouette),
+    /// It casts one with the other faces of the body of that number.
+    Together(u32, Silhouette),
 }
 
 /// What was found out about occluders from where one observer is; memory that is used again and again.
@@ -34,8 +47,12 @@ pub(super) struct Silhouettes {
     pub point: DVec3,
     pub normal: DVec3,
     pub edges: Vec<EdgePlane>,
-    /// By occluder: the number of the observer who looked last, and what was seen.
-    known: Vec<(u64, Option<Silhouette>)>,
+    /// Points and unit normals of planes that face the observer; the normals point beyond.
+    pub planes: Vec<(DVec3, DVec3)>,
+    /// By occluder, and by body: the number of the observer who looked last, and what was seen. Nothing
+    /// where a body's faces cast shadows of their own.
+    known: Vec<(u64, Seen)>,
+    known_bodies: Vec<(u64, Option<Seen>)>,
     observer: u64,
 }
 
@@ -44,33 +61,63 @@ impl Silhouettes {
     pub fn look_from(&mut self, observer: &Observer) {
         (self.point, self.normal) = (observer.point, observer.normal);
         self.edges.clear();
+        self.planes.clear();
         self.observer += 1;
         if self.known.len() < observer.occluders.len() {
-            self.known.resize(observer.occluders.len(), (0, None));
+            self.known.resize(observer.occluders.len(), (0, Seen::Nothing));
+        }
+        if self.known_bodies.len() < observer.occluders.bodies.len() {
+            self.known_bodies.resize(observer.occluders.bodies.len(), (0, None));
         }
     }
 
-    /// The silhouette of an occluder; `None` where it blocks nothing that matters, seen from this point.
-    pub fn of(&mut self, observer: &Observer, index: usize) -> Option<Silhouette> {
+    /// What is seen of an occluder.
+    pub fn of(&mut self, observer: &Observer, index: usize) -> Seen {
         let (looked, found) = self.known[index];
         if looked == self.observer {
             return found;
         }
-        let found = (!cannot_be_shaded(observer, index)).then(|| self.trace(observer, index));
+        let body = observer.occluders.body_of[index];
+        let together = if body == NONE { None } else { self.of_body(observer, body) };
+        let found = match together {
+            Some(seen) => seen,
+            None if cannot_be_shaded(observer, index) => Seen::Nothing,
+            None => Seen::Alone(self.trace(observer, index)),
+        };
         self.known[index] = (self.observer, found);
         found
     }
 
+    fn of_body(&mut self, observer: &Observer, number: u32) -> Option<Seen> {
+        let (looked, found) = self.known_bodies[number as usize];
+        if looked == self.observer {
+            return found;
+        }
+        let found = self.trace_body(observer, &observer.occluders.bodies[number as usize], number);
+        self.known_bodies[number as usize] = (self.observer, found);
+        found
+    }
+
     fn trace(&mut self, observer: &Observer, index: usize) -> Silhouette {
+        let (begin, first) = (self.edges.len(), self.planes.len());
+        self.trace_face(observer, index, |_| true);
+        Silhouette { begin, end: self.edges.len(), first, last: self.planes.len() }
+    }
+
+    /// Adds the plane of an occluder, and of those edges that are wanted.
+    fn trace_face(&mut self, observer: &Observer, index: usize, wanted: impl Fn(usize) -> bool) {
         let corners = observer.occluders.corners(index);
         let (on_plane, n) = observer.occluders.plane(index);
         // Seen from its front the corners run counter-clockwise, and the cross products of
         // successive corners point outward.
         let side = -(observer.point - on_plane).dot(n).signum();
-        let begin = self.edges.len();
-        for (i, &w) in corners.iter().enumerate() {
+        self.planes.push((on_plane, side * n));
+        for i in (0..corners.len()).filter(|&i| wanted(i)) {
+            let (begin, end) = (corners[i], corners[(i + 1) % corners.len()]);
+            // Edges of one outline are to run the same way round: each has another first corner.
+            let first = if side < 0.0 { begin } else { end };
             // a x edge is a x b, without the cancellation for short edges.
-            let (a, edge) = (w - observer.point, corners[(i + 1) % corners.len()] - w);
+            let (a, edge) = (first - observer.point, end - begin);
             let normal = side * a.cross(edge);
             self.edges.push(EdgePlane {
                 to_corner: a,
@@ -80,7 +127,43 @@ impl Silhouettes {
                 edge: edge.length(),
             });
         }
-        Silhouette { begin, end: self.edges.len(), side }
+    }
+
+    /// The outline of a body, between faces that are turned towards the observer and others. None
+    /// where the observer looks into it or is inside: its faces cast shadows of their own then.
+    fn trace_body(&mut self, observer: &Observer, body: &Body, number: u32) -> Option<Seen> {
+        let Observer { occluders, point, normal } = *observer;
+        let tau = occluders.coincidence();
+        let looks_in = |(on, n): &(DVec3, DVec3)| (point - *on).dot(*n) > tau;
+        if body.missing.iter().any(looks_in) {
+            return None;
+        }
+        let is_turned = |face: &Face| {
+            let (on_plane, n) = occluders.plane(face.occluder as usize);
+            (point - on_plane).dot(n) * face.outward > tau
+        };
+        let turned: [bool; MOST_FACES] =
+            std::array::from_fn(|k| body.faces.get(k).is_some_and(is_turned));
+        let continues = |face: &Face| {
+            let (on_plane, n) = occluders.plane(face.occluder as usize);
+            continues_flat(normal, n, &[(point - on_plane).dot(n)])
+        };
+        let mut fronts = body.faces.iter().zip(turned).filter(|(_, turned)| *turned).peekable();
+        if fronts.peek().is_none() || fronts.any(|(face, _)| continues(face)) {
+            return None;
+        }
+        if body.corners.iter().all(|&w| (w - point).dot(normal) <= tau) {
+            return Some(Seen::Nothing);
+        }
+        let (begin, first) = (self.edges.len(), self.planes.len());
+        for (face, _) in body.faces.iter().zip(turned).filter(|(_, turned)| *turned) {
+            self.trace_face(observer, face.occluder as usize, |i| {
+                let beyond = face.beyond[i];
+                beyond == NONE || !turned[beyond as usize]
+            });
+        }
+        let (end, last) = (self.edges.len(), self.planes.len());
+        Some(Seen::Together(number, Silhouette { begin, end, first, last }))
     }
 }
 

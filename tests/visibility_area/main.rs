@@ -11,6 +11,8 @@ mod scenes;
 
 use glam::DVec3;
 use look::look;
+use lumel::geometry::Frame;
+use lumel::visibility::{Observer, Occluders, Shadows};
 use random::Random;
 use scenes::Sight;
 
@@ -76,4 +78,48 @@ fn areas_of_nearly_coincident_scenes_are_exact() {
 #[test]
 fn areas_past_very_short_edges_are_exact() {
     compare(scenes::short_edged_sight, 2000, 1e-7);
+}
+
+#[test]
+fn areas_behind_solids_are_exact() {
+    compare(scenes::solid_sight, 3000, 1e-10);
+}
+
+#[test]
+fn areas_behind_solids_on_a_grid_are_exact() {
+    compare(scenes::solid_grid_sight, 3000, 1e-10);
+}
+
+/// A box between, closed or standing without a bottom: one shadow, which is all that is cast.
+#[test]
+fn a_box_casts_one_shadow() {
+    let frame = Frame::new(DVec3::ZERO, DVec3::Z);
+    let floor = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]
+        .map(|[x, y]| frame.project(DVec3::new(x, y, 0.0)));
+    let mut r = Random::new(1);
+    for seed in 0..200 {
+        let (point, bottom) = (DVec3::new(0.0, 0.0, 4.0) + r.point(0.9), seed % 2 == 0);
+        let at = |x: usize, y: usize, z: usize| {
+            DVec3::new(1.5 * x as f64 + 0.5, y as f64 - 0.5, z as f64 + f64::from(bottom))
+        };
+        let quad = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
+        let mut faces: Vec<[DVec3; 3]> = vec![];
+        for (a, b) in [((0, 0), (1, 0)), ((1, 0), (1, 1)), ((1, 1), (0, 1)), ((0, 1), (0, 0))] {
+            faces.extend(quad([
+                at(a.0, a.1, 0),
+                at(b.0, b.1, 0),
+                at(b.0, b.1, 1),
+                at(a.0, a.1, 1),
+            ]));
+        }
+        for z in [0, 1].into_iter().skip(usize::from(!bottom)) {
+            faces.extend(quad([at(0, 0, z), at(1, 0, z), at(1, 1, z), at(0, 1, z)]));
+        }
+        let occluders = Occluders::build(&faces);
+        let observer = Observer { occluders: &occluders, point, normal: -DVec3::Z };
+        let (mut shadows, mut active) = (Shadows::default(), vec![]);
+        shadows.look_from(&observer);
+        shadows.find(&observer, &frame, &floor, &mut active);
+        assert_eq!(active.len(), 1, "{seed}");
+    }
 }

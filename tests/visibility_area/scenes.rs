@@ -200,3 +200,103 @@ pub fn short_edged_sight(seed: u64) -> Sight {
         .collect();
     sight
 }
+
+/// Faces of a prism or a pyramid over a polygon of 3 to 8 corners: the rim of its base, and where each of
+/// its corners, or all, are lifted to. Some of them may be missing.
+fn solid(r: &mut Random, base: &[DVec3], lift: DVec3, pointed: bool) -> Vec<[DVec3; 3]> {
+    let n = base.len();
+    let apex = base.iter().sum::<DVec3>() / n as f64 + lift;
+    let rim = |k: usize| base[k % n];
+    let up = |k: usize| rim(k) + lift;
+    let turn = r.below(2) == 1;
+    let end = |at: &dyn Fn(usize) -> DVec3| -> Vec<[DVec3; 3]> {
+        (1..n - 1).map(|k| [at(0), at(k), at(k + 1)]).collect()
+    };
+    let mut faces: Vec<Vec<[DVec3; 3]>> = (0..n)
+        .map(|k| match pointed {
+            true => vec![[rim(k), rim(k + 1), apex]],
+            false => quad([rim(k), rim(k + 1), up(k + 1), up(k)]).to_vec(),
+        })
+        .collect();
+    faces.push(end(&rim));
+    if !pointed {
+        faces.push(end(&up));
+    }
+    // Closed, without a base, or without any one or two faces.
+    match r.below(4) {
+        0 => {}
+        1 => drop(faces.remove(n)),
+        k => (1..k).for_each(|_| drop(faces.remove(r.below(faces.len())))),
+    }
+    // The direction of corners must not matter.
+    let flip = |[a, b, c]: [DVec3; 3]| if turn { [a, c, b] } else { [a, b, c] };
+    faces.concat().into_iter().map(flip).collect()
+}
+
+/// Solids between the observer and the source, around either, or through the source's plane.
+pub fn solid_sight(seed: u64) -> Sight {
+    let mut r = Random::new(seed);
+    loop {
+        let source = [r.point(1.0), r.point(1.0), r.point(1.0)];
+        let (point, centre) = (r.point(1.5), (source[0] + source[1] + source[2]) / 3.0);
+        let normal = ((centre - point).normalize() + 0.9 * r.direction()).normalize();
+        let mut sight = Sight { source, point, normal, blockers: vec![] };
+        let n = (source[1] - source[0]).cross(source[2] - source[0]);
+        if !(sight.rises() > 0.02 && n.length() > 0.05) {
+            continue;
+        }
+        for _ in 0..1 + r.below(3) {
+            let middle = point.lerp(centre, r.within(0.0, 1.1)) + r.point(0.3);
+            let size = r.within(0.1, 0.7);
+            let (u, v) = (size * r.direction(), size * r.direction());
+            let corners = 3 + r.below(6);
+            let base: Vec<DVec3> = (0..corners)
+                .map(|k| {
+                    let (s, c) = (std::f64::consts::TAU * k as f64 / corners as f64).sin_cos();
+                    middle + c * u + s * v
+                })
+                .collect();
+            let (lift, pointed) = (size * r.direction(), r.below(3) == 0);
+            sight.blockers.extend(solid(&mut r, &base, lift, pointed));
+        }
+        sight.blockers.push(source);
+        return sight;
+    }
+}
+
+/// Boxes and pyramids on the grid {0..4}^3, which touch each other, the source and the observer.
+pub fn solid_grid_sight(seed: u64) -> Sight {
+    let mut r = Random::new(seed);
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    loop {
+        let corner =
+            |r: &mut Random| DVec3::new(r.below(5) as f64, r.below(5) as f64, r.below(5) as f64);
+        let source = [corner(&mut r), corner(&mut r), corner(&mut r)];
+        let mut point = corner(&mut r);
+        if r.below(2) == 1 {
+            point += 0.5 * axes[r.below(3)];
+        }
+        let normal = match r.below(3) {
+            0 => r.direction(),
+            k => axes[r.below(3)] * if k == 1 { 1.0 } else { -1.0 },
+        };
+        let mut sight = Sight { source, point, normal, blockers: vec![] };
+        let rises = sight.rises();
+        if !(rises.is_finite() && rises > 1e-3) {
+            continue;
+        }
+        for _ in 0..1 + r.below(4) {
+            let (a, b) = (corner(&mut r), corner(&mut r));
+            let size = b - a;
+            if size.x * size.y * size.z == 0.0 {
+                continue;
+            }
+            let (x, y) = (DVec3::X * size.x, DVec3::Y * size.y);
+            let base = [a, a + x, a + x + y, a + y];
+            let pointed = r.below(3) == 0;
+            sight.blockers.extend(solid(&mut r, &base, DVec3::Z * size.z, pointed));
+        }
+        sight.blockers.push(source);
+        return sight;
+    }
+}
