@@ -44,16 +44,16 @@ pub(super) enum Seen {
 #[derive(Default)]
 pub(super) struct Silhouettes {
     /// Where the observer is, and the unit normal there.
-    pub point: DVec3,
-    pub normal: DVec3,
+    point: DVec3,
+    normal: DVec3,
     pub edges: Vec<EdgePlane>,
     /// Points and unit normals of planes that face the observer; the normals point beyond.
     pub planes: Vec<(DVec3, DVec3)>,
-    /// By occluder, and by body: the number of the observer who looked last, and what was seen. Nothing
-    /// where a body's faces cast shadows of their own.
-    known: Vec<(u64, Seen)>,
-    known_bodies: Vec<(u64, Option<Seen>)>,
-    observer: u64,
+    /// By occluder, then by body: the number of the observer who looked last, and the place in `seen`.
+    known: Vec<(u32, u32)>,
+    /// None for a body whose faces cast shadows of their own.
+    seen: Vec<Option<Seen>>,
+    observer: u32,
 }
 
 impl Silhouettes {
@@ -62,39 +62,48 @@ impl Silhouettes {
         (self.point, self.normal) = (observer.point, observer.normal);
         self.edges.clear();
         self.planes.clear();
-        self.observer += 1;
-        if self.known.len() < observer.occluders.len() {
-            self.known.resize(observer.occluders.len(), (0, Seen::Nothing));
+        self.seen.clear();
+        self.observer = self.observer.wrapping_add(1);
+        if self.observer == 0 {
+            self.known.clear();
+            self.observer = 1;
         }
-        if self.known_bodies.len() < observer.occluders.bodies.len() {
-            self.known_bodies.resize(observer.occluders.bodies.len(), (0, None));
+        let count = observer.occluders.len() + observer.occluders.bodies.len();
+        if self.known.len() < count {
+            self.known.resize(count, (0, 0));
         }
     }
 
-    /// What is seen of an occluder.
+    /// What is seen of an occluder by the observer who looks.
     pub fn of(&mut self, observer: &Observer, index: usize) -> Seen {
-        let (looked, found) = self.known[index];
-        if looked == self.observer {
-            return found;
-        }
-        let body = observer.occluders.body_of[index];
-        let together = if body == NONE { None } else { self.of_body(observer, body) };
-        let found = match together {
-            Some(seen) => seen,
-            None if cannot_be_shaded(observer, index) => Seen::Nothing,
-            None => Seen::Alone(self.trace(observer, index)),
-        };
-        self.known[index] = (self.observer, found);
-        found
+        debug_assert_eq!((self.point, self.normal), (observer.point, observer.normal));
+        let found = self.once(index, |own| {
+            let body = observer.occluders.body_of[index];
+            let together = if body == NONE { None } else { own.of_body(observer, body) };
+            Some(match together {
+                Some(seen) => seen,
+                None if cannot_be_shaded(observer, index) => Seen::Nothing,
+                None => Seen::Alone(own.trace(observer, index)),
+            })
+        });
+        found.unwrap_or(Seen::Nothing)
     }
 
     fn of_body(&mut self, observer: &Observer, number: u32) -> Option<Seen> {
-        let (looked, found) = self.known_bodies[number as usize];
+        let body = &observer.occluders.bodies[number as usize];
+        let slot = observer.occluders.len() + number as usize;
+        self.once(slot, |own| own.trace_body(observer, body, number))
+    }
+
+    /// What was found before, or is found now.
+    fn once(&mut self, slot: usize, find: impl FnOnce(&mut Self) -> Option<Seen>) -> Option<Seen> {
+        let (looked, place) = self.known[slot];
         if looked == self.observer {
-            return found;
+            return self.seen[place as usize];
         }
-        let found = self.trace_body(observer, &observer.occluders.bodies[number as usize], number);
-        self.known_bodies[number as usize] = (self.observer, found);
+        let found = find(self);
+        self.known[slot] = (self.observer, self.seen.len() as u32);
+        self.seen.push(found);
         found
     }
 
