@@ -5,6 +5,10 @@ use glam::DVec3;
 use super::bodies::{Body, Face, MOST_FACES, NONE};
 use super::shadows::{Observer, continues_flat};
 
+/// Where a face of a body is seen edge-on, all of its faces cast shadows of their own: roundings would
+/// turn parts of the outline. Height over the plane, in units of the distance.
+const EDGE_ON: f64 = 1e-6;
+
 /// The plane through the observer and an edge of an occluder.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EdgePlane {
@@ -138,8 +142,9 @@ impl Silhouettes {
         }
     }
 
-    /// The outline of a body, between faces that are turned towards the observer and others. None
-    /// where the observer looks into it or is inside: its faces cast shadows of their own then.
+    /// The outline of a body, between faces that are turned towards the observer and others. None where
+    /// the observer looks into it, is inside, or sees a face edge-on: its faces cast shadows of their
+    /// own then.
     fn trace_body(&mut self, observer: &Observer, body: &Body, number: u32) -> Option<Seen> {
         let Observer { occluders, point, normal } = *observer;
         let tau = occluders.coincidence();
@@ -147,10 +152,15 @@ impl Silhouettes {
         if body.missing.iter().any(looks_in) {
             return None;
         }
-        let is_turned = |face: &Face| {
+        let height = |face: &Face| {
             let (on_plane, n) = occluders.plane(face.occluder as usize);
-            (point - on_plane).dot(n) * face.outward > tau
+            (point - on_plane).dot(n) * face.outward
         };
+        let reach = body.corners.iter().map(|w| w.distance(point)).fold(0.0, f64::max);
+        if body.faces.iter().any(|face| height(face).abs() <= EDGE_ON * reach) {
+            return None;
+        }
+        let is_turned = |face: &Face| height(face) > 0.0;
         let turned: [bool; MOST_FACES] =
             std::array::from_fn(|k| body.faces.get(k).is_some_and(is_turned));
         let continues = |face: &Face| {
