@@ -329,8 +329,7 @@ impl Shadows {
                 for (k, f) in lines.iter().enumerate() {
                     let rest = self.inside.get(0);
                     let values = &mut self.values;
-                    values.clear();
-                    values.extend(rest.iter().map(|&x| f.at(x)));
+                    f.cut(rest, values);
                     // What lies in the plane of an occluder it does not shade. A thin
                     // occluder's plane is known where the occluder is: here, between its edges.
                     if begin + k >= planes && values.iter().all(|&v| v <= 0.0) {
