@@ -145,6 +145,66 @@ fn blocks_cut_the_floor() {
     }
 }
 
+/// What is below is as dark, whether a block touches the floor or not.
+#[test]
+fn floating_blocks_cut_the_floor() {
+    for foot in [1e-5, 1e-4, 1e-3, 1e-2] {
+        for open in [false, true] {
+            for (x, y, turn) in [(0.7, 0.3, 0.3), (0.5, 0.5, 0.0), (0.47, 0.55, 0.29)] {
+                let mut blocks = vec![block(x, y, 0.25, turn, foot)];
+                if !open {
+                    let top = blocks[0][0];
+                    blocks[0].push(top.map(|p| DVec3::new(p.x, p.y, foot)));
+                }
+                let mesh = check(&on_floor(&blocks));
+                assert!(mesh.contacts.cut >= 1 && mesh.roots.len() < 200, "{:?}", mesh.contacts);
+                blocks[0].truncate(5);
+                feet_are_cut(&mesh, &blocks, |p| p);
+            }
+        }
+    }
+    // Light from all sides comes in below what is higher.
+    let mesh = check(&on_floor(&[block(0.7, 0.3, 0.25, 0.3, 0.05)]));
+    assert_eq!(mesh.contacts.cut, 0);
+}
+
+/// A wall that is not quite flat, and one that goes on at another height: nothing hovers.
+#[test]
+fn what_goes_on_beside_a_face_does_not_cut_it() {
+    let mut bent = floor(0.0, 0.0, 1.0, 1.0, 0.0);
+    for height in [1e-3, -1e-3] {
+        bent[2].z = height;
+        assert_eq!(check(&of(&[bent])).contacts.cut, 0);
+    }
+    let step = [floor(0.0, 0.0, 1.0, 1.0, 0.0), floor(1.0, 0.0, 2.0, 1.0, 1e-3)];
+    assert_eq!(check(&of(&step)).contacts.cut, 0);
+}
+
+/// Strips below the rim of a sheet and beside it, if light is wanted to a tolerance, and else none.
+#[test]
+fn narrow_gaps_get_elements_of_their_own() {
+    let sheet = [floor(0.0, 0.0, 1.0, 1.0, 0.0), floor(0.2, 0.3, 0.7, 0.6, 5e-3)];
+    let mut scene = of(&sheet);
+    scene.materials[0].two_sided = true;
+    let options = MeshOptions { basis: Basis::Linear, refinement: Refinement::Levels(0) };
+    let roots = |tolerance: f64| {
+        lumel::mesh::build_to_tolerance(&scene, &options, tolerance).unwrap().roots.len()
+    };
+    let without = mesh_of(&scene, Refinement::Levels(0)).roots.len();
+    assert_eq!(roots(3e-2), without);
+    assert!(roots(1e-2) > without + 50, "{} and {without}", roots(1e-2));
+    assert_eq!(roots(1e-3), roots(1e-2));
+    // On both sides of the outline, three heights away.
+    let mesh = lumel::mesh::build_to_tolerance(&scene, &options, 1e-2).unwrap();
+    for x in [0.2 - 0.015, 0.2, 0.2 + 0.015] {
+        for face in 0..mesh.faces.len() {
+            if mesh.faces[face].triangle < 2 {
+                on_one_side(&mesh, face, DVec3::new(x, 0.35, 0.0), DVec3::new(x, 0.55, 0.0));
+            }
+        }
+    }
+}
+
 #[test]
 fn coordinates_rounded_to_f32_make_no_slivers() {
     for k in 0..20 {
@@ -174,7 +234,7 @@ fn what_only_touches_in_points_or_along_edges_cuts_nothing() {
     let mut scene = on_floor(&[]);
     scene.triangles.push(triangle(tip, 0));
     assert_eq!(check(&scene).roots.len(), 3);
-    let floating = on_floor(&[block(0.5, 0.5, 0.25, 0.2, 1e-4)]);
+    let floating = on_floor(&[block(0.5, 0.5, 0.25, 0.2, 0.05)]);
     assert_eq!(check(&floating).roots.len(), floating.triangles.len());
 }
 

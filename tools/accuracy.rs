@@ -57,6 +57,9 @@ struct Texels {
     /// Points, root by root, and the texel of each.
     asked: Vec<RootPoints>,
     texel: Vec<Vec<usize>>,
+    /// Their numbers, which are the same for all meshes of a scene.
+    number: Vec<Vec<usize>>,
+    numbers: usize,
     /// Points of each texel.
     count: Vec<f64>,
 }
@@ -66,7 +69,13 @@ impl Texels {
         let root = |r| RootPoints { root: r, points: vec![] };
         let roots = mesh.roots.len();
         let asked = (0..roots as u32).map(root).collect();
-        let mut texels = Texels { asked, texel: vec![vec![]; roots], count: vec![] };
+        let mut texels = Texels {
+            asked,
+            texel: vec![vec![]; roots],
+            number: vec![vec![]; roots],
+            numbers: 0,
+            count: vec![],
+        };
         let surfaces = mesh.faces.iter().map(|f| f.surface + 1).max().unwrap_or(0);
         for surface in 0..surfaces {
             let faces: Vec<&Face> = mesh.faces.iter().filter(|f| f.surface == surface).collect();
@@ -117,6 +126,8 @@ impl Texels {
                 });
                 self.count[texel] += 1.0;
                 self.asked[root].points.push(x);
+                self.number[root].push(self.numbers);
+                self.numbers += 1;
                 self.texel[root].push(texel);
             }
         }
@@ -137,8 +148,14 @@ impl Texels {
     }
 
     /// Single ones of the values at points.
-    fn some(values: &[Vec<DVec3>]) -> Vec<DVec3> {
-        values.iter().flatten().step_by(POINTS).copied().collect()
+    fn some(&self, values: &[Vec<DVec3>]) -> Vec<DVec3> {
+        let mut some = vec![DVec3::ZERO; self.numbers.div_ceil(POINTS)];
+        for (number, value) in self.number.iter().flatten().zip(values.iter().flatten()) {
+            if number % POINTS == 0 {
+                some[number / POINTS] = *value;
+            }
+        }
+        some
     }
 
     fn means(&self, values: &[Vec<DVec3>]) -> Vec<DVec3> {
@@ -195,7 +212,7 @@ fn run_here(scene: &str, way: &str, tolerance: f64, reference: &Path) -> Result<
         "estimate": estimate.rms.hypot(counts.error(estimate.mean)),
         "maximum estimate": estimate.maximum + counts.largest_error(estimate.mean),
     });
-    let single = Texels::some(&values);
+    let single = texels.some(&values);
     let of_points = reference.with_added_extension("points");
     if !reference.exists() {
         write_numbers(reference, means.iter().flat_map(|h| h.to_array()))?;

@@ -33,11 +33,13 @@ impl Forecast {
     /// Builds the mesh and forecasts the operator.
     pub fn new(scene: &Scene, settings: &SolveSettings) -> Result<Forecast> {
         // To a tolerance the coarsest mesh is what must fit; finer ones follow while they do.
-        let (options, operator) = match settings.tolerance {
-            Some(_) => (COARSEST, OperatorKind::Fast(FastOptions::new(1e-2, None, None)?)),
-            None => (settings.light_options().mesh, settings.operator),
+        let (mesh, operator) = match settings.tolerance {
+            Some(tolerance) => (
+                mesh::build_to_tolerance(scene, &COARSEST, tolerance)?,
+                OperatorKind::Fast(FastOptions::new(1e-2, None, None)?),
+            ),
+            None => (mesh::build(scene, &settings.light_options().mesh)?, settings.operator),
         };
-        let mesh = mesh::build(scene, &options)?;
         let fits = |bytes| settings.max_memory.is_none_or(|allowed| bytes <= allowed);
         if let Some(tolerance) = settings.tolerance
             && is_many(mesh.roots.len(), tolerance)

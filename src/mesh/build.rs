@@ -23,9 +23,25 @@ pub struct MeshOptions {
 /// can take. A request for more is a mistake in units or levels, and refused before it allocates.
 const MOST_ELEMENTS: f64 = 5.0e7;
 
+/// Light that comes into a gap of height g and length L, on a surface of area A, and that elements do not
+/// hold, is an error of (5e-3 g L / A)^(1/2) of the mean (measured: a sheet over a floor). It is a third of
+/// the tolerance at this height over its square and the size of the scene, if the gap is four times as
+/// long as the scene and the surface that of a cube.
+const STRIPS: f64 = 33.0;
+
 /// Builds the mesh of a scene; elements come in the order of the scene's triangles, the back side
 /// of a two-sided triangle after its front.
 pub fn build(scene: &Scene, options: &MeshOptions) -> Result<Mesh> {
+    build_with_strips(scene, options, f64::INFINITY)
+}
+
+/// The same for light to a tolerance, relative to its mean: gaps between faces that can matter for it get
+/// elements of their own (see `outlines.rs`).
+pub fn build_to_tolerance(scene: &Scene, options: &MeshOptions, tolerance: f64) -> Result<Mesh> {
+    build_with_strips(scene, options, STRIPS * tolerance * tolerance * scene.extent())
+}
+
+fn build_with_strips(scene: &Scene, options: &MeshOptions, least_gap: f64) -> Result<Mesh> {
     let mut faces: Vec<Face> = vec![];
     for (index, triangle) in scene.triangles.iter().enumerate() {
         let two_sided = scene.materials[triangle.material as usize].two_sided;
@@ -46,7 +62,7 @@ pub fn build(scene: &Scene, options: &MeshOptions) -> Result<Mesh> {
     for (i, face) in faces.iter().enumerate().filter(|(_, f)| !f.back) {
         front[face.triangle as usize] = Some(i as u32);
     }
-    let (cuts, contacts) = contacts::find(scene, &faces, &front, &joins);
+    let (cuts, contacts) = contacts::find(scene, &faces, &front, &joins, least_gap);
     let mut roots = vec![];
     for i in 0..faces.len() {
         let triangle = faces[i].triangle as usize;

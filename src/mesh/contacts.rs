@@ -18,14 +18,17 @@
 //! across it.
 //!
 //! Cost: O((n + k) log n) for n triangles with k pairs of near ones, then for each cut triangle the
-//! square of its few segments. Contacts wider than the tolerance (a block that floats a little) are
-//! none: nothing is moved to close them.
+//! square of its few segments. A block that floats by more than the tolerance has no contact, and
+//! nothing is moved to close the gap; where it is narrow, the face is cut along the block's outline all
+//! the same ([`super::outlines`]).
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Face;
 use super::arrangement::arrange;
+use super::clip::{beside, clip, height};
+use super::outlines::{Heights, outline};
 use super::pieces::{Cut, cut_along};
 use super::seams::Joins;
 use super::shape::improve;
@@ -43,6 +46,9 @@ const PARALLEL: f64 = 1e-4;
 /// Triangles longer than this share of the scene are cut into well-shaped pieces: they will be
 /// refined and seen. Small ones become few elements whatever their shape.
 const LARGE: f64 = 1.0 / 6.0;
+
+/// Gaps of at most this share of a triangle's size are narrow.
+const NARROW: f64 = 1.0 / 64.0;
 
 /// Most segments of one triangle that are tried: far more than may be left once they are snapped.
 const MOST_SEGMENTS: usize = 1000;
@@ -66,18 +72,19 @@ pub struct Contacts {
 
 /// Cuts of all triangles of a scene: `None` for those that nothing touches.
 ///
-/// `faces` has the front of every triangle; `front[i]` is its number.
+/// `faces` has the front of every triangle; `front[i]` is its number. Gaps from `least_gap` on get strips.
 pub(super) fn find(
     scene: &Scene,
     faces: &[Face],
     front: &[Option<u32>],
     joins: &Joins,
+    least_gap: f64,
 ) -> (Vec<Option<Cut>>, Contacts) {
     let boxes: Vec<Bounds> = scene.triangles.iter().map(|t| Bounds::of(&t.vertices)).collect();
     let tree = BoxTree::build(&boxes);
     let all = boxes.iter().fold(Bounds::EMPTY, |a, &b| a.union(b));
     let (tolerance, extent) = (contact_distance(all, scene.rounding), all.extent());
-    let finder = Finder { scene, faces, front, joins, boxes, tree, tolerance, extent };
+    let finder = Finder { scene, faces, front, joins, boxes, tree, tolerance, extent, least_gap };
     let found: Vec<(Option<Cut>, Contacts)> =
         (0..scene.triangles.len()).into_par_iter().map(|i| finder.cut(i)).collect();
     let mut sum = Contacts::default();
@@ -100,72 +107,110 @@ struct Finder<'a> {
     tree: BoxTree,
     tolerance: f64,
     extent: f64,
+    least_gap: f64,
 }
 
 impl Finder<'_> {
     fn cut(&self, triangle: usize) -> (Option<Cut>, Contacts) {
         let mut counts = Contacts::default();
-        let segments = self.segments(triangle);
-        let Some(face) = self.front[triangle].filter(|_| !segments.is_empty()) else {
+        let Some(front) = self.front[triangle] else { return (None, counts) };
+        let corners = &self.faces[front as usize].corners;
+        if height(corners) < THIN * self.tolerance {
             return (None, counts);
-        };
-        let corners = &self.faces[face as usize].corners;
+        }
+        let touching = self.segments(triangle, front);
+        let hovering = self.outlines(triangle, front);
+        if touching.is_empty() && hovering.is_empty() {
+            return (None, counts);
+        }
         let shapely = self.boxes[triangle].extent() > LARGE * self.extent;
-        let cut = LEAST_LENGTHS.iter().find_map(|share| {
-            let least = share * self.boxes[triangle].extent();
-            let long = |s: &&[DVec2; 2]| s[0].distance(s[1]) >= least;
-            let segments: Vec<[DVec2; 2]> = segments.iter().filter(long).copied().collect();
+        let along = |segments: &[[DVec2; 2]]| {
             if segments.is_empty() || segments.len() > MOST_SEGMENTS {
                 return None;
             }
-            let arrangement = arrange(corners, &segments, self.tolerance)?;
+            let arrangement = arrange(corners, segments, self.tolerance)?;
             let mut cut = cut_along(arrangement, self.tolerance)?;
             if shapely && cut.pieces.len() > 1 {
                 improve(&mut cut);
             }
-            counts.simplified = usize::from(*share > 0.0);
             Some(cut)
+        };
+        let both = if hovering.is_empty() {
+            None
+        } else {
+            along(&[&touching[..], &hovering[..]].concat())
+        };
+        let cut = both.or_else(|| {
+            LEAST_LENGTHS.iter().find_map(|share| {
+                let least = share * self.boxes[triangle].extent();
+                let long = |s: &&[DVec2; 2]| s[0].distance(s[1]) >= least;
+                let cut = along(&touching.iter().filter(long).copied().collect::<Vec<_>>())?;
+                counts.simplified = usize::from(*share > 0.0);
+                Some(cut)
+            })
         });
         match &cut {
             Some(cut) => {
                 counts.segments = cut.contacts.len();
                 counts.cut = usize::from(cut.pieces.len() > 1);
             }
-            None => counts.left_whole = 1,
+            None => counts.left_whole = usize::from(!touching.is_empty()),
         }
         (cut, counts)
     }
 
-    /// What all near triangles leave on `triangle`, in coordinates of its front.
-    fn segments(&self, triangle: usize) -> Vec<[DVec2; 2]> {
-        let Some(front) = self.front[triangle] else { return vec![] };
-        let face = &self.faces[front as usize];
-        if height(&face.corners) < THIN * self.tolerance {
-            return vec![];
-        }
-        let near = self.boxes[triangle].grown(self.tolerance);
+    /// Triangles within a distance of one, in order, but for those of its own surface, and their fronts.
+    fn near(&self, triangle: usize, front: u32, distance: f64) -> Vec<(usize, u32)> {
+        let near = self.boxes[triangle].grown(distance);
         let mut others = vec![];
         self.tree.visit(|b| b.meets(near), |i| others.push(i));
         // The order in which a tree proposes depends on its shape.
         others.sort_unstable();
-        let joined = [0, 1, 2].map(|k| self.joins.continued(front, k));
+        others.retain(|&other| other != triangle && self.boxes[other].meets(near));
+        let fronts = others.into_iter().filter_map(|other| Some((other, self.front[other]?)));
+        fronts.filter(|&(_, its)| !self.joins.same_surface(front, its)).collect()
+    }
+
+    /// The part of a segment that cuts a face or severs it from a flat neighbour.
+    fn kept(&self, front: u32, p: DVec2, q: DVec2) -> Option<[DVec2; 2]> {
+        let corners = &self.faces[front as usize].corners;
+        let [p, q] = clip(p, q, corners, self.tolerance)?;
+        let along = |k| {
+            !self.joins.continued(front, k)
+                && beside(corners, k, p, self.tolerance)
+                && beside(corners, k, q, self.tolerance)
+        };
+        (!(0..3).any(along)).then_some([p, q])
+    }
+
+    /// What all triangles that touch `triangle` or cross it leave on it, in coordinates of its front.
+    fn segments(&self, triangle: usize, front: u32) -> Vec<[DVec2; 2]> {
+        let frame = &self.faces[front as usize].frame;
         let mut segments = vec![];
-        for other in others {
-            let Some(its) = self.front[other] else { continue };
-            let same = self.joins.same_surface(front, its);
-            if same || other == triangle || !self.boxes[other].meets(near) {
-                continue;
-            }
-            self.marks(&face.frame, other, its, |p, q| {
-                if let Some([p, q]) = clip(p, q, &face.corners, self.tolerance)
-                    && !(0..3).any(|k| {
-                        !joined[k]
-                            && beside(&face.corners, k, p, self.tolerance)
-                            && beside(&face.corners, k, q, self.tolerance)
-                    })
-                {
-                    segments.push([p, q]);
-                }
+        for (other, its) in self.near(triangle, front, self.tolerance) {
+            self.marks(frame, other, its, |p, q| segments.extend(self.kept(front, p, q)));
+        }
+        segments
+    }
+
+    /// What hovers over a radiating side of `triangle`, the same way.
+    fn outlines(&self, triangle: usize, front: u32) -> Vec<[DVec2; 2]> {
+        let reach = NARROW * self.boxes[triangle].extent();
+        let others = self.near(triangle, front, reach);
+        let mut segments = vec![];
+        if others.is_empty() || reach <= self.tolerance {
+            return segments;
+        }
+        let sides: &[f64] = if self.joins.two_sided(front) { &[1.0, -1.0] } else { &[1.0] };
+        let triangles: Vec<[DVec3; 3]> =
+            others.iter().map(|&(other, _)| self.scene.triangles[other].vertices).collect();
+        let Face { frame, corners, .. } = &self.faces[front as usize];
+        let open = [0, 1, 2].map(|k| !self.joins.continued(front, k));
+        for &side in sides {
+            let (touching, strips) = (self.tolerance, self.least_gap);
+            let heights = Heights { side, touching, reach, strips };
+            outline(frame, corners, open, heights, &triangles, |p, q| {
+                segments.extend(self.kept(front, p, q));
             });
         }
         segments
@@ -211,92 +256,6 @@ impl Finder<'_> {
                 if let [p, q] = ends[..] {
                     mark(p, q);
                 }
-            }
-        }
-    }
-}
-
-/// Smallest height of a triangle.
-fn height(t: &[DVec2; 3]) -> f64 {
-    let longest = (0..3).map(|k| t[k].distance(t[(k + 1) % 3])).fold(0.0, f64::max);
-    (t[1] - t[0]).perp_dot(t[2] - t[0]) / longest
-}
-
-/// Inward unit normal of edge `k` of a counter-clockwise triangle.
-fn inward(t: &[DVec2; 3], k: usize) -> DVec2 {
-    (t[(k + 1) % 3] - t[k]).perp().normalize()
-}
-
-/// Whether `x` lies on the line of edge `k`, within the tolerance.
-fn beside(t: &[DVec2; 3], k: usize, x: DVec2, tolerance: f64) -> bool {
-    (x - t[k]).dot(inward(t, k)).abs() <= tolerance
-}
-
-/// The part of a segment in a counter-clockwise triangle.
-///
-/// Distances from an edge of at most the tolerance count as zero, and such an end is moved onto
-/// the edge: both triangles beside a shared edge then see a line that runs up to it end in the same
-/// point. `None` when no more than the tolerance is left.
-fn clip(p: DVec2, q: DVec2, t: &[DVec2; 3], tolerance: f64) -> Option<[DVec2; 2]> {
-    let (mut p, mut q) = (p, q);
-    for k in 0..3 {
-        let n = inward(t, k);
-        let distance = |x: DVec2| {
-            let d = (x - t[k]).dot(n);
-            if d.abs() <= tolerance { 0.0 } else { d }
-        };
-        let (dp, dq) = (distance(p), distance(q));
-        if dp.min(dq) < 0.0 && dp.max(dq) <= 0.0 {
-            return None;
-        }
-        let onto = |x: DVec2| x - n * (x - t[k]).dot(n);
-        let cross = p + (q - p) * (dp / (dp - dq));
-        let (from, to) = (p, q);
-        p = if dp == 0.0 {
-            onto(from)
-        } else if dp < 0.0 {
-            cross
-        } else {
-            from
-        };
-        q = if dq == 0.0 {
-            onto(to)
-        } else if dq < 0.0 {
-            cross
-        } else {
-            to
-        };
-    }
-    (p.distance(q) > tolerance).then_some([p, q])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const T: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::Y];
-    const TOLERANCE: f64 = 1e-6;
-
-    #[test]
-    fn a_segment_is_clipped() {
-        let at = DVec2::new;
-        let cases = [
-            (at(-1.0, 0.25), at(2.0, 0.25), Some([at(0.0, 0.25), at(0.75, 0.25)])),
-            (at(0.125, 0.25), at(0.25, 0.25), Some([at(0.125, 0.25), at(0.25, 0.25)])),
-            (at(0.25, -5e-7), at(0.25, 0.5), Some([at(0.25, 0.0), at(0.25, 0.5)])),
-            (at(0.25, -5e-7), at(0.5, 5e-7), Some([at(0.25, 0.0), at(0.5, 0.0)])),
-            (at(0.25, -1.0), at(0.25, 5e-7), None),
-            (at(-1.0, 1.0), at(1.0, -1.0), None),
-            (at(-1.0, 0.5), at(0.5, -1.0), None),
-            (at(2.0, 2.0), at(3.0, 0.0), None),
-        ];
-        for (p, q, want) in cases {
-            let got = clip(p, q, &T, TOLERANCE);
-            match (got, want) {
-                (Some([a, b]), Some([c, d])) => {
-                    assert!(a.distance(c) < 1e-15 && b.distance(d) < 1e-15, "{p} {q}: {got:?}");
-                }
-                _ => assert_eq!(got, want, "{p} {q}"),
             }
         }
     }

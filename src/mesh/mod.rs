@@ -8,7 +8,9 @@
 mod appearance;
 mod arrangement;
 mod build;
+mod clip;
 mod contacts;
+mod outlines;
 mod pieces;
 mod refine;
 mod seams;
@@ -20,7 +22,7 @@ use crate::geometry::{Bounds, Frame, triangle_area};
 
 pub use crate::geometry::CONTACT;
 pub use appearance::appearance;
-pub use build::{MeshOptions, build};
+pub use build::{MeshOptions, build, build_to_tolerance};
 pub use contacts::Contacts;
 pub use refine::{DEEPEST, Refinement, child, level_for};
 pub use seams::{Seam, Side};

@@ -91,6 +91,11 @@ impl Joins {
         self.continued[face as usize][k]
     }
 
+    /// Whether a face has another side that radiates.
+    pub fn two_sided(&self, face: u32) -> bool {
+        self.back[face as usize] != face
+    }
+
     /// Whether two faces, or one and the other side of the other, are of one surface.
     pub fn same_surface(&self, face: u32, other: u32) -> bool {
         let surface = |f: u32| self.surface[f as usize];

@@ -201,7 +201,7 @@ struct Ladder<'a> {
 pub fn light_within(scene: &Scene, options: &WithinOptions, monitor: &Monitor) -> Result<Light> {
     let triangles: Vec<[DVec3; 3]> = scene.triangles.iter().map(|t| t.vertices).collect();
     let occluders = Occluders::build(&triangles);
-    let base = mesh::build(scene, &COARSEST)?;
+    let base = mesh::build_to_tolerance(scene, &COARSEST, options.tolerance)?;
     if is_many(base.roots.len(), options.tolerance) {
         return light_of_many(scene, base, occluders, options, monitor);
     }

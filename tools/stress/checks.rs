@@ -79,7 +79,8 @@ pub fn gathered(
 /// Largest errors of one scene; zero where nothing was looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Errors {
-    /// |sum of a row - 1| where all that is seen radiates, and rows looked at.
+    /// |sum of a row - 1| where all that is seen radiates, beyond what may be lost in gaps whose sides count
+    /// as touching, and rows looked at.
     pub closure: f64,
     pub rows: usize,
     /// Sum of a row above 1.
@@ -132,7 +133,8 @@ pub fn errors(case: &Case, basis: Basis, effort: Effort, seed: u64) -> Errors {
             if case.closed {
                 let seen = look(scene, point, normal, RAYS_FOR_CLOSURE, lift, at);
                 if seen.radiant == 1.0 && seen.black == 0.0 {
-                    (found.closure, found.rows) = ((sum - 1.0).abs(), 1);
+                    let short = 1.0 - sum - case.lost_in_gaps(point);
+                    (found.closure, found.rows) = (short.max(sum - 1.0).max(0.0), 1);
                 }
             }
             if i % step == step / 2 {
